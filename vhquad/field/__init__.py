@@ -1,0 +1,1 @@
+"""Cross fields: representation, files, alignment, singularities."""

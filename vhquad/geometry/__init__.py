@@ -1,0 +1,1 @@
+"""Intrinsic geometry: frames, Laplacians, spectra, curvature, input features."""

@@ -1,0 +1,1 @@
+"""Triangle and quad meshes: reading, repair, topology, quality."""

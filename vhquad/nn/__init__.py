@@ -1,0 +1,1 @@
+"""The Vector Heat Network: layers, loss, checkpoints."""

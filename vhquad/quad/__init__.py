@@ -1,0 +1,1 @@
+"""From a face cross field to quads: seamless map, quantisation, extraction, polish."""
