@@ -324,7 +324,7 @@ class TriMesh:
     # ---- parts ----------------------------------------------------------------------------
 
     def submesh(self, face_mask: ArrayLike) -> tuple[TriMesh, Ints]:
-        """The faces of a mask or index list as a mesh of their own, and its vertices' old indices."""
+        """The faces of a mask or index list as a mesh, and the old indices of its vertices."""
         chosen = self.faces[np.asarray(face_mask)]
         used, local = np.unique(chosen, return_inverse=True)
         return TriMesh(self.vertices[used], local.reshape(-1, 3)), used

@@ -1,0 +1,141 @@
+"""ClosestPoints: the nearest surface point of a triangle mesh, with its face and barycentrics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import igl
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vhquad.errors import MeshError
+from vhquad.mesh.triangle import TriMesh
+
+__all__ = ["ClosestPoints", "Hits", "closest_barycentrics"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Hits:
+    """Closest points of q queries; ``point = barycentric @ corners of face``."""
+
+    distance: Floats
+    """(q,) distance from the query, mesh units."""
+    face: Ints
+    """(q,) face that holds the closest point."""
+    barycentric: Floats
+    """(q, 3) weights of the face's corners, each in [0, 1], summing to 1."""
+    point: Floats
+    """(q, 3) closest point."""
+
+    def interpolate(self, corner_values: ArrayLike) -> NDArray[Any]:
+        """Values at the closest points of a linear function given at face corners.
+
+        Parameters
+        ----------
+        corner_values : (m, 3, ...) array_like
+            Value at corner k of face f; ``x[mesh.faces]`` for a value x per vertex.
+
+        Returns
+        -------
+        (q, ...) ndarray
+        """
+        return np.einsum("qk,qk...->q...", self.barycentric, np.asarray(corner_values)[self.face])
+
+
+class ClosestPoints:
+    """Closest-point queries on one mesh; the tree is built once, at construction.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+        Any triangles; topology is not looked at.
+    """
+
+    def __init__(self, mesh: TriMesh) -> None:
+        self._vertices = np.array(mesh.vertices)
+        self._faces = np.array(mesh.faces)
+        self._tree = igl.AABB()
+        self._tree.init(self._vertices, self._faces)
+
+    def query(self, points: ArrayLike) -> Hits:
+        """Closest surface point of each query point.
+
+        Parameters
+        ----------
+        points : (q, 3) array_like
+
+        Returns
+        -------
+        Hits
+
+        Raises
+        ------
+        MeshError
+            If the points are not (q, 3) and finite.
+        """
+        p = np.array(points, dtype=np.float64, order="C")
+        if p.ndim != 2 or p.shape[1] != 3:
+            raise MeshError(f"query points must have shape (q, 3), not {p.shape}")
+        if not np.isfinite(p).all():
+            raise MeshError("query points must be finite")
+        if len(p) == 0:
+            face = np.zeros(0, dtype=np.int64)
+        else:
+            _, face, _ = self._tree.squared_distance(self._vertices, self._faces, p)
+            face = np.asarray(face, dtype=np.int64).reshape(-1)
+        corners = self._vertices[self._faces[face]]
+        barycentric = closest_barycentrics(corners, p)
+        point = np.einsum("qk,qki->qi", barycentric, corners)
+        return Hits(np.linalg.norm(p - point, axis=1), face, barycentric, point)
+
+
+def closest_barycentrics(corners: Floats, points: Floats) -> Floats:
+    """Barycentric coordinates of the point of each triangle closest to its query.
+
+    The best of four candidates, the projection to the plane where it falls inside and the closest
+    points of the three edges, so that slivers and triangles without area are served too.
+
+    Parameters
+    ----------
+    corners : (q, 3, 3) float64
+        Corner k of triangle i is ``corners[i, k]``.
+    points : (q, 3) float64
+
+    Returns
+    -------
+    (q, 3) float64
+        In [0, 1], summing to 1.
+    """
+    # Three edges: candidate k lies between corners k and k + 1.
+    edge = np.roll(corners, -1, axis=1) - corners
+    offset = points[:, None, :] - corners
+    square = np.einsum("qki,qki->qk", edge, edge)
+    along = np.einsum("qki,qki->qk", edge, offset)
+    t = np.divide(along, square, out=np.zeros_like(along), where=square > 0).clip(0.0, 1.0)
+    gap = offset - t[:, :, None] * edge
+    distance = np.einsum("qki,qki->qk", gap, gap)
+    best = distance.argmin(axis=1)
+    row = np.arange(len(points))
+    result = np.zeros((len(points), 3))
+    result[row, best] = 1.0 - t[row, best]
+    result[row, (best + 1) % 3] = t[row, best]
+
+    # The inside: weight of corner k is the area of (k + 1, k + 2, point) over the whole.
+    normal = np.cross(edge[:, 0], -edge[:, 2])
+    area = np.einsum("qi,qi->q", normal, normal)
+    part = np.einsum("qki,qi->qk", np.cross(edge, offset), normal)
+    weight = np.divide(part, area[:, None], out=np.full_like(part, -1.0), where=area[:, None] > 0)
+    weight = np.roll(weight, -1, axis=1)
+    height = np.divide(
+        np.einsum("qi,qi->q", offset[:, 0], normal) ** 2,
+        area,
+        out=np.full(len(points), np.inf),
+        where=area > 0,
+    )
+    inside = (weight >= 0).all(axis=1) & (height < distance[row, best])
+    result[inside] = weight[inside]
+    return np.asarray(result / result.sum(axis=1, keepdims=True))
