@@ -52,10 +52,11 @@ class ClosestPoints:
     Parameters
     ----------
     mesh : TriMesh
-        Any triangles; topology is not looked at.
+        Any triangles; topology is not looked at. Kept as the attribute ``mesh``.
     """
 
     def __init__(self, mesh: TriMesh) -> None:
+        self.mesh = mesh
         self._vertices = np.array(mesh.vertices)
         self._faces = np.array(mesh.faces)
         self._tree = igl.AABB()

@@ -1,0 +1,196 @@
+"""smooth_quads: unfolds, squares up, keeps surface, curves and corners."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.quad_meshes import (
+    Quads,
+    cube_sphere,
+    quad_disk,
+    quad_grid,
+    quad_torus,
+    shaken,
+    triangulated,
+)
+from vhquad.errors import MeshError
+from vhquad.mesh.closest import ClosestPoints
+from vhquad.quad.curves import CurveConstraints
+from vhquad.quad.distortion import corner_jacobians, distortion, quad_normals
+from vhquad.quad.smooth import folded_quads, smooth_quads, smoothed_sizes
+
+NOBODY = np.zeros(0, dtype=np.int64)
+
+
+def outward(quads: Quads, x: np.ndarray) -> np.ndarray:
+    """Surface normals near the quads, from the closest points of their centres."""
+    mesh = triangulated(quads)
+    return mesh.face_normals[ClosestPoints(mesh).query(x[quads[1]].mean(axis=1)).face]
+
+
+@pytest.mark.parametrize("quads", [cube_sphere(8), quad_torus()], ids=["cube_sphere", "torus"])
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_closed_surfaces_unfold(quads: Quads, seed: int) -> None:
+    mesh = triangulated(quads)
+    x = shaken(quads, np.random.default_rng(seed), 1.5, NOBODY)
+    surface = ClosestPoints(mesh)
+    x = surface.query(x).point
+    before = folded_quads(x, quads[1], outward(quads, x))
+    out = smooth_quads(x, quads[1], surface)
+    # 1: the test means something: a fifth of the quads came folded.
+    assert before.mean() > 0.2
+    # 2: none is left.
+    assert not folded_quads(out, quads[1], outward(quads, out)).any()
+    # 3: angles are good; the undisturbed meshes have least scaled Jacobians of 0.87 and above.
+    assert corner_jacobians(out, quads[1], quad_normals(out, quads[1])).min() > 0.6
+    # 4: on the surface, to rounding.
+    assert surface.query(out).distance.max() < 1e-12
+
+
+def test_a_strip_squeezed_to_nothing_opens() -> None:
+    quads = quad_torus(30, 12)
+    x = quads[0].reshape(30, 12, 3).copy()
+    x[10] = x[11] = 0.5 * (x[10] + x[11])
+    x[20] = 0.9 * x[20] + 0.1 * x[21]
+    x[21] = 1.2 * x[20] - 0.2 * x[21]  # turned over
+    x = x.reshape(-1, 3)
+    assert folded_quads(x, quads[1], outward(quads, x)).sum() >= 24
+    out = smooth_quads(x, quads[1], ClosestPoints(triangulated(quads)))
+    assert not folded_quads(out, quads[1], outward(quads, out)).any()
+    # The strips take their share again: no rung shorter than a third of the mean.
+    rung = np.linalg.norm(
+        np.roll(out.reshape(30, 12, 3), -1, axis=0) - out.reshape(30, 12, 3), axis=2
+    )
+    assert rung.min() > rung.mean() / 3
+
+
+def test_flat_grid_comes_back_exactly() -> None:
+    quads = quad_grid(12, 10)
+    v, q = quads
+    corner = np.flatnonzero(np.isin(v[:, 0], [0, 12]) & np.isin(v[:, 1], [0, 10]))
+    sides = [v[:, 1] == 0, v[:, 0] == 12, v[:, 1] == 10, v[:, 0] == 0]
+    curve = np.full(len(v), -1)
+    for i, side in enumerate(sides):
+        curve[side] = i
+    corners = np.array([[0, 0, 0], [12, 0, 0], [12, 10, 0], [0, 10, 0.0]])
+    lines = [corners[[i, (i + 1) % 4]] for i in range(4)]
+    fixed = np.isin(np.arange(len(v)), corner)
+    x = shaken(quads, np.random.default_rng(4), 0.8, np.flatnonzero(curve >= 0))
+    x[curve == 0] += [0.3, 0, 0] * (~fixed[curve == 0])[:, None]
+    out = smooth_quads(
+        x,
+        q,
+        ClosestPoints(triangulated(quads)),
+        fixed,
+        CurveConstraints(lines, [False] * 4, curve),
+        iterations=100,
+        target_edge=np.ones(len(v)),
+    )
+    # Unit squares are the only minimum of the energy, which is smooth there: L-BFGS gets close.
+    assert np.abs(out - v).max() < 1e-4
+
+
+def test_boundary_slides_on_its_circle() -> None:
+    quads = quad_disk(6, 6)
+    v, q = quads
+    mesh = triangulated(quads)
+    rim = mesh.tail[mesh.boundary_loops[0]]
+    curve = np.full(len(v), -1)
+    curve[rim] = 0
+    circle = CurveConstraints([v[rim]], [True], curve)
+    rng = np.random.default_rng(0)
+    x = shaken(quads, rng, 0.9, rim)
+    arc = circle.locate(rim, v[rim])
+    x[rim] = circle.position(rim, arc + 0.4 * rng.uniform(-1, 1, len(rim)) * np.diff(arc).mean())
+    out = smooth_quads(x, q, ClosestPoints(mesh), curves=circle)
+    # 1: no folds, 2: on the polyline to rounding, 3: vertices did move along it.
+    assert not folded_quads(out, q, np.tile([0, 0, 1.0], (len(q), 1))).any()
+    at = circle.position(rim, circle.locate(rim, out[rim]))
+    assert np.abs(at - out[rim]).max() < 1e-12
+    assert np.linalg.norm(out[rim] - x[rim], axis=1).max() > 1e-3
+
+
+def test_fixed_vertices_do_not_move_and_good_meshes_stay_good() -> None:
+    quads = cube_sphere(6)
+    v, q = quads
+    fixed = np.zeros(len(v), dtype=bool)
+    fixed[[0, 17, 40]] = True
+    before = corner_jacobians(v, q, quad_normals(v, q)).min()
+    out = smooth_quads(v, q, ClosestPoints(triangulated(quads)), fixed)
+    assert (out[fixed] == v[fixed]).all()
+    assert corner_jacobians(out, q, quad_normals(out, q)).min() > min(before, 0.8) - 1e-9
+
+
+def test_thin_sheet_keeps_its_sides() -> None:
+    """Two parallel layers much closer than an edge: no vertex changes layer."""
+    v, q = quad_grid(10, 10)
+    lift = np.array([0, 0, 0.05])
+    top, bottom = v + lift, v - lift
+    both = np.concatenate([top, bottom]), np.concatenate([q, q[:, ::-1] + len(v)])
+    mesh = triangulated(both)
+    edge = np.flatnonzero(mesh.is_boundary_vertex)
+    x = shaken(both, np.random.default_rng(1), 1.2, edge)
+    out = smooth_quads(x, both[1], ClosestPoints(mesh), mesh.is_boundary_vertex)
+    assert np.abs(out[:, 2] - both[0][:, 2]).max() < 1e-12
+    assert not folded_quads(out, both[1], outward(both, both[0])).any()
+
+
+def test_target_edges_steer_density() -> None:
+    quads = quad_torus(40, 16)
+    v, q = quads
+    wanted = np.where(v[:, 0] > 0, 2.0, 1.0)
+    out = smooth_quads(v, q, ClosestPoints(triangulated(quads)), target_edge=wanted, iterations=60)
+    area = lambda x: np.linalg.norm(  # noqa: E731
+        np.cross(x[q[:, 2]] - x[q[:, 0]], x[q[:, 3]] - x[q[:, 1]]), axis=1
+    )
+    big = v[q].mean(axis=1)[:, 0] > 0
+    # The torus starts even; afterwards the wanted half is clearly larger.
+    assert area(v)[big].mean() == pytest.approx(area(v)[~big].mean(), rel=0.05)
+    assert area(out)[big].mean() > 1.2 * area(out)[~big].mean()
+
+
+def test_gradient_is_that_of_the_energy(rng: np.random.Generator) -> None:
+    v, q = cube_sphere(2)
+    x = v + 0.4 * rng.normal(size=v.shape)  # some corners folded
+    n, size = quad_normals(v, q), np.full(len(q), 0.7)
+    for epsilon in (0.3, 0.05):
+        at = distortion(x, q, n, size, epsilon, 0.3)
+        assert (at.area < 0).any()
+        direction = rng.normal(size=v.shape)
+        h = 1e-6
+        ahead = distortion(x + h * direction, q, n, size, epsilon, 0.3, False).energy
+        behind = distortion(x - h * direction, q, n, size, epsilon, 0.3, False).energy
+        # Central differences: error about h², far below the tolerance.
+        slope = (at.gradient * direction).sum()
+        assert (ahead - behind) / (2 * h) == pytest.approx(slope, rel=1e-5)
+
+
+def test_unit_square_is_the_minimum() -> None:
+    v, q = quad_grid(1, 1)
+    n, size = np.array([[0, 0, 1.0]]), np.ones(1)
+    at = distortion(v, q, n, size, 1e-9, 0.3)
+    # F = 1, D = 1: each corner costs 1 + λ, and the gradient vanishes.
+    assert at.energy == pytest.approx(4 * 1.3, abs=1e-12)
+    assert np.abs(at.gradient).max() < 1e-12
+
+
+def test_sizes_keep_area_and_smooth_out() -> None:
+    v, q = quad_grid(10, 10)
+    x = v.copy()
+    x[:, 0] = np.where(v[:, 0] == 5, 5.99, v[:, 0])
+    size = smoothed_sizes(x, q, 100.0)
+    assert (size**2).sum() == pytest.approx(100.0)
+    assert size.min() > 0.7
+    assert size.max() < 1.3
+
+
+def test_bad_input_is_refused() -> None:
+    v, q = quad_grid(2, 2)
+    surface = ClosestPoints(triangulated((v, q)))
+    with pytest.raises(MeshError, match="outside"):
+        smooth_quads(v, q + 5, surface)
+    with pytest.raises(MeshError, match="one entry a vertex"):
+        smooth_quads(v, q, surface, fixed=[True])
+    with pytest.raises(MeshError, match="no length"):
+        CurveConstraints([[[0, 0, 0], [0, 0, 0]]], [False], np.full(9, -1))
