@@ -14,9 +14,9 @@ CONVENTIONS (everything else in vhquad points here)
   ``exp(i K_f)``, K_f that face's share of the curvature.
 - A field of order N (N-RoSy) is stored as the N-th power of any of its directions, hence is
   carried by ``r ** N`` and ``vertex_to_face ** N``.
-- 3-D axes (e1, e2): e1 x e2 is the outward normal. At a face e1 runs along halfedge 0. At a vertex e1
-  is fitted to all edges (see :func:`vertex_axes`), because rescaled angles have no exact picture
-  in the tangent plane.
+- 3-D axes (e1, e2): e1 x e2 is the outward normal. At a face e1 runs along halfedge 0. At a
+  vertex e1 is fitted to all edges (see :func:`vertex_axes`), because rescaled angles have no exact
+  picture in the tangent plane.
 """
 
 from __future__ import annotations
@@ -31,9 +31,20 @@ from vhquad.errors import MeshError
 from vhquad.geometry.intrinsic import corner_angles, mollified_lengths
 from vhquad.mesh.triangle import TriMesh, prev_halfedge
 
-__all__ = ["Axes", "Frames", "build_frames", "face_axes", "from_3d", "to_3d", "vertex_axes"]
+__all__ = [
+    "Axes",
+    "Frames",
+    "bisector_transport",
+    "build_frames",
+    "edge_transport",
+    "face_axes",
+    "from_3d",
+    "to_3d",
+    "vertex_axes",
+]
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 Complexes = NDArray[np.complex128]
 
 
@@ -97,18 +108,61 @@ def build_frames(mesh: TriMesh) -> Frames:
     scale = np.divide(full, angle_sum, out=np.ones_like(full), where=angle_sum > 0)
 
     angle = preceding * scale[mesh.tail]
-    inner = mesh.twin >= 0
-    reverse = np.where(inner, angle[mesh.twin], np.pi)
-    transport = np.exp(1j * (reverse + np.pi - angle))
-    second = np.flatnonzero(mesh.twin > np.arange(len(angle)))
-    transport[mesh.twin[second]] = transport[second].conj()
+    return Frames(
+        lengths=lengths,
+        corner_angle=corner,
+        angle_sum=angle_sum,
+        angle_scale=scale,
+        halfedge_angle=angle,
+        reverse_angle=np.where(mesh.twin >= 0, angle[mesh.twin], np.pi),
+        transport=edge_transport(angle, mesh.twin),
+        face_angle=_face_angles(corner),
+        vertex_to_face=bisector_transport(corner, angle.reshape(-1, 3), scale[mesh.faces]),
+    )
 
-    face_angle = np.zeros_like(corner)
-    face_angle[:, 1] = np.pi - corner[:, 1]
-    face_angle[:, 2] = np.pi + corner[:, 0]
-    half = 0.5 * corner * (1.0 - scale[mesh.faces])
-    to_face = np.exp(1j * (face_angle - angle.reshape(-1, 3) + half))
-    return Frames(lengths, corner, angle_sum, scale, angle, reverse, transport, face_angle, to_face)
+
+def edge_transport(halfedge_angle: Floats, twin: Ints) -> Complexes:
+    """``r_h`` of each halfedge from the directions at the tails, exactly conjugate to the twin's.
+
+    Parameters
+    ----------
+    halfedge_angle : (3m,) float64
+        Angle in the frame of the tail.
+    twin : (3m,) int64
+        -1 on a boundary, where the direction back is at pi by convention.
+
+    Returns
+    -------
+    (3m,) complex128
+    """
+    reverse = np.where(twin >= 0, halfedge_angle[twin], np.pi)
+    transport = np.exp(1j * (reverse + np.pi - halfedge_angle))
+    lower = np.flatnonzero(twin > np.arange(len(twin)))
+    transport[twin[lower]] = transport[lower].conj()
+    return transport
+
+
+def bisector_transport(corner: Floats, halfedge_angle: Floats, scale: Floats) -> Complexes:
+    """Vertex-to-face rotations that match the corners' bisectors.
+
+    Parameters
+    ----------
+    corner, halfedge_angle, scale : (m, 3) float64
+        True corner angles; angle of halfedge k in the frame of its tail; frame angle per true angle
+        at corner k's vertex.
+
+    Returns
+    -------
+    (m, 3) complex128
+    """
+    turn = _face_angles(corner) - halfedge_angle + 0.5 * corner * (1.0 - scale)
+    return np.asarray(np.exp(1j * turn))
+
+
+def _face_angles(corner: Floats) -> Floats:
+    """Angle of halfedge k in the frame of its face, from the corner angles; (m, 3)."""
+    first = np.zeros(len(corner))
+    return np.stack([first, np.pi - corner[:, 1], np.pi + corner[:, 0]], axis=1)
 
 
 def _fan_angles(mesh: TriMesh, corner: Floats) -> tuple[Floats, Floats]:
