@@ -1,0 +1,247 @@
+"""From a cross field to what a map needs: aligned to features, matched, with legal indices.
+
+This is the door between fields and maps: :class:`AlignedField` holds every integer that the map
+takes from the field, on a mesh refined just enough for the map to exist.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from dataclasses import field as default
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vhquad.errors import ConfigError, FieldError
+from vhquad.field.cancel import cancel_pairs, cure_low_sectors, low_sectors
+from vhquad.field.cross import CrossField
+from vhquad.field.matching import MatchedField, match_field
+from vhquad.field.refine import Refinement, no_refinement, split_edges
+from vhquad.field.separate import separate_features, separate_singularities
+from vhquad.field.smooth import polish
+from vhquad.mesh.triangle import TriMesh
+
+__all__ = ["AlignReport", "AlignSettings", "AlignedField", "align_field"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+MOST_SPLITS = 12  # rounds of splitting where vertices are too few; one or two happen
+
+
+@dataclass(frozen=True)
+class AlignSettings:
+    """How a field is made fit for a map.
+
+    Attributes
+    ----------
+    edge_length : float, optional
+        Edge length of the quads to come. Default: the median size of the field, or what makes
+        2,000 quads.
+    smoothing : float
+        Details of the field smaller than this many edge lengths are smoothed away.
+    cancel : float
+        Opposite singularities closer than this many edge lengths are cancelled; 0 cancels none.
+    """
+
+    edge_length: float | None = None
+    smoothing: float = 0.5
+    cancel: float = 0.5
+
+    def __post_init__(self) -> None:
+        if self.edge_length is not None and not 0.0 < self.edge_length < np.inf:
+            raise ConfigError(f"edge_length must be positive, not {self.edge_length}")
+        for name in ("smoothing", "cancel"):
+            if not 0.0 <= getattr(self, name) < np.inf:
+                raise ConfigError(f"{name} must not be negative, it is {getattr(self, name)}")
+
+
+@dataclass(frozen=True)
+class AlignReport:
+    """What was done to a field.
+
+    Attributes
+    ----------
+    edge_length : float
+        Quad edge length that distances were measured by.
+    splits : int
+        Vertices added.
+    pairs_cancelled : int
+        Pairs of opposite singularities taken out.
+    indices_moved : int
+        Quarter indices moved away from vertices that had too few quads.
+    singularities : dict of int to int
+        Interior singular vertices by number of quads around them (4 less 4 times the index).
+    """
+
+    edge_length: float
+    splits: int = 0
+    pairs_cancelled: int = 0
+    indices_moved: int = 0
+    singularities: dict[int, int] = default(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class AlignedField:
+    """A field ready for a seamless map.
+
+    Guaranteed: every face has at most one feature edge; every other edge has at most one end on a
+    feature and joins at most one singular sector (quads other than 4, at a feature other than 2);
+    ``sector_quads`` is at least 1, and at interior vertices at least 3.
+
+    Attributes
+    ----------
+    mesh : TriMesh
+        The input split further; its vertices keep their index, new ones lie on its faces.
+    parent_face : (m,) int64
+        Face of the input in which each face lies.
+    angle : (m,) float64
+        Angle of the direction that becomes the u axis of the face's chart, counter-clockwise
+        from the face's halfedge 0, radians.
+    size : (m,) float64 or None
+        Wanted quad edge length.
+    feature : (3m,) bool
+        Halfedges on a boundary or crease (both halfedges of a crease).
+    axis : (3m,) int64
+        a in 0..3: the map sends a feature halfedge to direction ``i**a`` of its face's chart;
+        -1 elsewhere.
+    rotation : (3m,) int64
+        r in 0..3: ``z_g = i**r z_f + t`` from the face f of the halfedge to g across it;
+        0 on boundaries.
+    sector : (m, 3) int64
+        Sector of each corner: corners around a vertex joined across non-feature edges.
+    sector_quads : (s,) int64
+        Quarter turns of the map's angle in each sector.
+    sector_vertex : (s,) int64
+    sector_is_feature : (s,) bool
+        Whether feature halfedges delimit the sector, else it is the full fan of a vertex.
+    report : AlignReport
+    """
+
+    mesh: TriMesh
+    parent_face: Ints
+    angle: Floats
+    size: Floats | None
+    feature: Bools
+    axis: Ints
+    rotation: Ints
+    sector: Ints
+    sector_quads: Ints
+    sector_vertex: Ints
+    sector_is_feature: Bools
+    report: AlignReport
+
+
+def align_field(
+    mesh: TriMesh,
+    field: CrossField,
+    creases: ArrayLike | None = None,
+    settings: AlignSettings | None = None,
+) -> AlignedField:
+    """Polish, align, match and clean a cross field.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+    field : CrossField
+        On faces; zero crosses are filled in.
+    creases : (k, 2) array_like of int, optional
+        Edges, as pairs of vertices, that quad edges must follow.
+    settings : AlignSettings, optional
+
+    Raises
+    ------
+    FieldError
+        If the field does not fit the mesh.
+    """
+    settings = settings or AlignSettings()
+    if field.domain != "faces" or len(field) != mesh.n_faces:
+        raise FieldError(
+            f"align_field needs a cross for each of {mesh.n_faces} faces, "
+            f"not {len(field)} on {field.domain}; see vhquad.field.transport"
+        )
+    length = _edge_length(mesh, field, settings)
+    feature = mesh.twin < 0
+    first = separate_features(mesh, feature)
+    matched = _solve(first, field, first.carry(feature, False), length, settings)
+    kept = np.zeros(matched.n_sectors, dtype=bool)
+    matched, cancelled = cancel_pairs(matched, settings.cancel * length, kept)
+    matched, room, moved = _cure(matched, settings.cancel * length)
+    matched, last = separate_singularities(matched)
+    report = AlignReport(
+        edge_length=length,
+        splits=matched.mesh.n_vertices - mesh.n_vertices,
+        pairs_cancelled=cancelled,
+        indices_moved=moved,
+        singularities=_singularities(matched),
+    )
+    return _pack(matched, first.then(room).then(last), field, report)
+
+
+def _edge_length(mesh: TriMesh, field: CrossField, settings: AlignSettings) -> float:
+    if settings.edge_length is not None:
+        return settings.edge_length
+    if field.size is not None and (field.size > 0).any():
+        return float(np.median(field.size[field.size > 0]))
+    return float(np.sqrt(mesh.area / 2000.0))
+
+
+def _solve(
+    refinement: Refinement,
+    field: CrossField,
+    feature: Bools,
+    length: float,
+    settings: AlignSettings,
+) -> MatchedField:
+    """The field polished on the refined mesh and matched."""
+    mesh = refinement.mesh
+    target = field.z[refinement.parent] * np.exp(-4j * refinement.turn)
+    trust = 1.0 if field.confidence is None else field.confidence[refinement.parent]
+    weight = trust * (target != 0) * mesh.face_areas / max(settings.smoothing * length, 1e-12) ** 2
+    z = polish(mesh, target, weight)
+    return match_field(mesh, np.angle(z) / 4.0, feature, np.zeros(len(feature)))
+
+
+def _cure(matched: MatchedField, distance: float) -> tuple[MatchedField, Refinement, int]:
+    """Every sector with the quads it needs; splits edges where vertices are too few."""
+    total, count = no_refinement(matched.mesh), 0
+    for _ in range(MOST_SPLITS):
+        matched, moved = cure_low_sectors(matched, distance)
+        count += moved
+        if not low_sectors(matched).any():
+            return matched, total, count
+        edges = np.ones(matched.mesh.n_edges, dtype=bool)
+        edges[matched.mesh.halfedge_edge[matched.feature]] = False
+        step = split_edges(matched.mesh, edges)
+        matched, total = matched.refined(step), total.then(step)
+    vertices = matched.sector_vertex[low_sectors(matched)]
+    raise FieldError(
+        f"{len(vertices)} vertices cannot get the quads they need, the first is {vertices[0]}; "
+        "use a finer mesh, or leave out a crease that ends there"
+    )
+
+
+def _singularities(matched: MatchedField) -> dict[int, int]:
+    plain = ~matched.sector_is_feature & matched.sector_is_singular
+    return dict(sorted(Counter(matched.sector_quads[plain].tolist()).items()))
+
+
+def _pack(
+    matched: MatchedField, refinement: Refinement, field: CrossField, report: AlignReport
+) -> AlignedField:
+    return AlignedField(
+        mesh=matched.mesh,
+        parent_face=refinement.parent,
+        angle=matched.angle,
+        size=None if field.size is None else field.size[refinement.parent],
+        feature=matched.feature,
+        axis=matched.axis,
+        rotation=matched.rotation,
+        sector=matched.corner_sector.reshape(-1, 3),
+        sector_quads=matched.sector_quads,
+        sector_vertex=matched.sector_vertex,
+        sector_is_feature=matched.sector_is_feature,
+        report=report,
+    )

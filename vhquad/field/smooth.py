@@ -1,0 +1,101 @@
+"""Smooth cross fields on faces: the smoothest one, and the polish of a given one.
+
+Both minimise quadratic energies of the fourth powers ``z`` and normalise afterwards.
+Reference: Knoeppel et al. 2013, "Globally optimal direction fields".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csc_matrix, diags
+from scipy.sparse.linalg import splu
+
+from vhquad.field.dual import carry4, dirichlet, dual_weights
+from vhquad.mesh.triangle import TriMesh
+
+__all__ = ["factorized", "polish", "smoothest"]
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+INVERSE_ITERATIONS = 12
+
+
+def smoothest(mesh: TriMesh, seed: int = 0) -> Complexes:
+    """Unit crosses of the least Dirichlet energy; (m,) complex128, one field per component.
+
+    Inverse iteration for the lowest eigenvector of the energy against the area.
+    """
+    energy, mass = _energy(mesh), np.maximum(mesh.face_areas, 1e-12 * mesh.area / mesh.n_faces)
+    scale = np.bincount(mesh.face_component, mass)[mesh.face_component]
+    solve = factorized(energy + diags(1e-3 * mass / scale))
+    rng = np.random.default_rng(seed)
+    z = np.exp(1j * rng.uniform(0.0, 2.0 * np.pi, mesh.n_faces))
+    for _ in range(INVERSE_ITERATIONS):
+        z = solve(mass * z)
+        norm = np.bincount(mesh.face_component, mass * np.abs(z) ** 2)
+        z = z / np.sqrt(norm)[mesh.face_component]
+    return unit(z)
+
+
+def polish(
+    mesh: TriMesh, target: Complexes, weight: Floats, fixed: NDArray[np.bool_] | None = None
+) -> Complexes:
+    """Minimise Dirichlet energy + sum over faces of ``weight |z - target|^2``; unit crosses (m,).
+
+    Parameters
+    ----------
+    mesh : TriMesh
+    target : (m,) complex128
+        The field to stay near; where ``fixed``, the field to keep (unit).
+    weight : (m,) float64
+        Of the data term, not negative. With ``area / l**2`` details below the length l are
+        smoothed away.
+    fixed : (m,) bool, optional
+        Faces that keep ``target`` exactly.
+
+    Notes
+    -----
+    A component without weights or fixed faces gets its smoothest field.
+    """
+    fixed = np.zeros(mesh.n_faces, dtype=bool) if fixed is None else fixed
+    component = mesh.face_component
+    said = np.bincount(component, weight * np.abs(target) + fixed)
+    silent = (said <= 0)[component]
+    if silent.any():
+        target = np.where(silent, smoothest(mesh), target)
+        weight = np.where(silent, mesh.face_areas / mesh.area, weight)
+    free = np.flatnonzero(~fixed)
+    z = np.array(target, dtype=np.complex128)
+    if free.size:
+        energy = _energy(mesh)
+        rows = energy[free]
+        matrix = rows[:, free] + diags(weight[free])
+        pull = weight[free] * target[free] - rows @ np.where(fixed, target, 0.0)
+        z[free] = factorized(matrix)(pull)
+    return unit(z)
+
+
+def unit(z: Complexes) -> Complexes:
+    """Complex numbers scaled to modulus 1; 1 where they vanish."""
+    modulus = np.abs(z)
+    return np.divide(z, modulus, out=np.ones_like(z), where=modulus > 0)
+
+
+def factorized(matrix: Any) -> Callable[[NDArray[Any]], NDArray[Any]]:
+    """Solver of a symmetric (or Hermitian) positive definite sparse matrix, by SuperLU."""
+    lu = splu(
+        csc_matrix(matrix),
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True},
+    )
+    return lu.solve
+
+
+def _energy(mesh: TriMesh) -> csc_matrix:
+    return dirichlet(mesh, dual_weights(mesh), carry4(mesh))
