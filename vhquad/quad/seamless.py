@@ -1,0 +1,406 @@
+"""The linear space of seamless maps of a cross field, with every constraint eliminated exactly.
+
+A seamless map gives each face a chart ``z = u + iv`` such that across the halfedge ``h`` from face
+``f`` to ``g`` the charts differ by ``z_g = i^r z_f + t``, that feature edges run along an axis, and
+that the quarter turns ``r`` are those of the field (Kälberer et al. 2007; Bommes et al. 2009). The
+charts are combed over a dual spanning tree, so that only the edges of a cut graph have ``r`` or
+``t`` other than zero, and the remaining linear relations are solved in rational arithmetic: every
+combination of the basis is seamless exactly, in floating point up to rounding and in integers
+without any error.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse.csgraph import breadth_first_order, connected_components
+
+from vhquad.field.align import AlignedField
+from vhquad.mesh.triangle import next_halfedge
+
+__all__ = ["SeamlessSpace", "seamless_space", "special_vertices"]
+
+Ints = NDArray[np.int64]
+
+# Real and imaginary part of i^r z in terms of (u, v): (source of u', sign), (source of v', sign).
+_TURN = (((0, 1), (1, 1)), ((1, -1), (0, 1)), ((0, -1), (1, -1)), ((1, 1), (0, -1)))
+
+
+@dataclass(frozen=True, eq=False)
+class SeamlessSpace:
+    """Seamless maps as combinations of a sparse basis.
+
+    Attributes
+    ----------
+    wedge : (m, 3) int64
+        Wedge of each corner: corners of one vertex that share their coordinates.
+    rotation : (3m,) int64
+        Quarter turns r across each halfedge, after combing.
+    angle : (m,) float64
+        Angle of the chart's u axis in the frame of the face, after combing.
+    basis : (2 w, d) csr_matrix of int64
+        Coordinates ``(u_0, v_0, u_1, v_1, ...)`` of the wedges are ``basis @ x / denominator``.
+    denominator : int
+        Common denominator; a power of two in all known cases.
+    even : (d,) bool
+        Unknowns on which the place of an isoline through a special vertex or along a feature
+        depends; the others move ordinary vertices only (see ``vhquad.quad.seamless_map.snap``).
+    """
+
+    wedge: Ints
+    rotation: Ints
+    angle: NDArray[np.float64]
+    basis: csr_matrix
+    denominator: int
+    even: NDArray[np.bool_]
+
+    @property
+    def n_wedges(self) -> int:
+        """Number of wedges."""
+        return self.basis.shape[0] // 2
+
+
+def seamless_space(aligned: AlignedField) -> SeamlessSpace:
+    """Comb the charts of an aligned field, cut it open and eliminate all seamless constraints."""
+    mesh = aligned.mesh
+    turns, tree = _comb(aligned)
+    inner = np.flatnonzero(mesh.twin >= 0)
+    rotation = np.zeros(3 * mesh.n_faces, dtype=np.int64)
+    rotation[inner] = (
+        aligned.rotation[inner] + turns[mesh.twin[inner] // 3] - turns[inner // 3]
+    ) % 4
+    cut = _cut_edges(aligned, tree)
+    wedge = _wedges(aligned, cut)
+    segments = _segments(aligned, cut)
+    links = _scalar_links(aligned, turns, rotation, wedge, segments)
+    basis, denominator, linked = _eliminate(2 * (int(wedge.max()) + 1), 2 * len(segments), links)
+
+    special = np.zeros(basis.shape[0], dtype=bool)
+    corner_special = special_vertices(aligned)[mesh.faces]
+    for axis in (0, 1):
+        special[2 * wedge[corner_special] + axis] = True
+    rows = basis[special | linked]
+    even = np.asarray(np.abs(rows).sum(axis=0)).ravel() > 0
+    return SeamlessSpace(
+        wedge=wedge,
+        rotation=rotation,
+        angle=aligned.angle - turns * (np.pi / 2),
+        basis=basis,
+        denominator=denominator,
+        even=even,
+    )
+
+
+def special_vertices(aligned: AlignedField) -> NDArray[np.bool_]:
+    """Vertices where isolines start: every irregular one, and seeds where there would be none.
+
+    Irregular are sectors of other than 4 quads inside or 2 along a feature, and vertices where
+    other than 0 or 2 feature edges meet. A feature curve without any, and a closed torus without
+    any, get one regular vertex as a seed. (n,) bool.
+    """
+    mesh = aligned.mesh
+    regular = np.where(aligned.sector_is_feature, 2, 4)
+    special = np.zeros(mesh.n_vertices, dtype=bool)
+    special[aligned.sector_vertex[aligned.sector_quads != regular]] = True
+    edges = mesh.edges[np.unique(mesh.halfedge_edge[aligned.feature])]
+    valence = np.bincount(edges.ravel(), minlength=mesh.n_vertices)
+    special |= (valence != 0) & (valence != 2)
+    if len(edges):
+        graph = coo_matrix(
+            (np.ones(len(edges), dtype=np.int8), (edges[:, 0], edges[:, 1])),
+            shape=(mesh.n_vertices, mesh.n_vertices),
+        )
+        curve = connected_components(graph, directed=False)[1]
+        bare = np.setdiff1d(curve[edges[:, 0]], curve[special & (valence > 0)])
+        for label in bare:
+            special[edges[curve[edges[:, 0]] == label][0, 0]] = True
+    if not special.any():
+        special[mesh.faces[0, 0]] = True
+    return special
+
+
+def _comb(aligned: AlignedField) -> tuple[Ints, NDArray[np.bool_]]:
+    """Quarter turns that make r = 0 over a dual spanning forest, and its edges as a mask."""
+    mesh = aligned.mesh
+    inner = np.flatnonzero(mesh.twin >= 0)
+    graph = coo_matrix(
+        (np.ones(len(inner), dtype=np.int8), (inner // 3, mesh.twin[inner] // 3)),
+        shape=(mesh.n_faces, mesh.n_faces),
+    ).tocsr()
+    turns = np.zeros(mesh.n_faces, dtype=np.int64)
+    tree = np.zeros(mesh.n_edges, dtype=bool)
+    twin_face = np.where(mesh.twin >= 0, mesh.twin // 3, -1).reshape(-1, 3)
+    roots = np.unique(mesh.face_component, return_index=True)[1]
+    for root in roots:
+        order, parent = breadth_first_order(graph, root, directed=False)
+        children = order[1:]
+        above = parent[children]
+        # The halfedge of the parent that faces the child.
+        side = np.argmax(twin_face[above] == children[:, None], axis=1)
+        h = 3 * above + side
+        tree[mesh.halfedge_edge[h]] = True
+        steps = aligned.rotation[h].tolist()
+        value = turns.tolist()
+        for child, up, step in zip(children.tolist(), above.tolist(), steps, strict=True):
+            value[child] = (value[up] - step) % 4
+        turns = np.array(value, dtype=np.int64)
+    return turns, tree
+
+
+def _cut_nodes(aligned: AlignedField) -> NDArray[np.bool_]:
+    """Vertices at which the transition across a cut may change: singular or on a feature."""
+    mesh = aligned.mesh
+    node = special_vertices(aligned)
+    node[mesh.tail[aligned.feature]] = True
+    node[mesh.head[aligned.feature]] = True
+    return node
+
+
+def _cut_edges(aligned: AlignedField, tree: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Interior edges off the tree, without loose ends at ordinary vertices."""
+    mesh = aligned.mesh
+    cut = ~tree & (mesh.edge_halfedges >= 0).all(axis=1)
+    keep = _cut_nodes(aligned)
+    ends = mesh.edges
+    degree = np.bincount(ends[cut].ravel(), minlength=mesh.n_vertices)
+    incident: list[set[int]] = [set() for _ in range(mesh.n_vertices)]
+    for e in np.flatnonzero(cut).tolist():
+        incident[ends[e, 0]].add(e)
+        incident[ends[e, 1]].add(e)
+    loose = deque(np.flatnonzero((degree == 1) & ~keep).tolist())
+    while loose:
+        v = loose.popleft()
+        if len(incident[v]) != 1:
+            continue
+        e = incident[v].pop()
+        cut[e] = False
+        other = int(ends[e, 0] + ends[e, 1] - v)
+        incident[other].discard(e)
+        if len(incident[other]) == 1 and not keep[other]:
+            loose.append(other)
+    return cut
+
+
+def _wedges(aligned: AlignedField, cut: NDArray[np.bool_]) -> Ints:
+    """Classes of corners joined across edges that are not cut; (m, 3)."""
+    mesh = aligned.mesh
+    h = np.flatnonzero((mesh.twin >= 0) & ~cut[mesh.halfedge_edge])
+    other = next_halfedge(mesh.twin[h])
+    size = 3 * mesh.n_faces
+    graph = coo_matrix((np.ones(len(h), dtype=np.int8), (h, other)), shape=(size, size))
+    label = connected_components(graph, directed=False)[1]
+    return label.astype(np.int64).reshape(-1, 3)
+
+
+def _segments(aligned: AlignedField, cut: NDArray[np.bool_]) -> list[list[int]]:
+    """Chains of cut halfedges with one transition each, from node to node of the cut graph."""
+    mesh = aligned.mesh
+    node = _cut_nodes(aligned)
+    edges = np.flatnonzero(cut)
+    degree = np.bincount(mesh.edges[edges].ravel(), minlength=mesh.n_vertices)
+    node |= degree != 2
+    leaving: dict[int, list[int]] = {}
+    for h in mesh.edge_halfedges[edges].ravel().tolist():
+        leaving.setdefault(int(mesh.tail[h]), []).append(h)
+    used: set[int] = set()
+    segments: list[list[int]] = []
+
+    def walk(first: int) -> None:
+        chain = [first]
+        used.add(int(mesh.halfedge_edge[first]))
+        while not node[mesh.head[chain[-1]]]:
+            back = int(mesh.twin[chain[-1]])
+            following = [h for h in leaving[int(mesh.head[chain[-1]])] if h != back]
+            if int(mesh.halfedge_edge[following[0]]) in used:
+                break
+            chain.append(following[0])
+            used.add(int(mesh.halfedge_edge[following[0]]))
+        segments.append(chain)
+
+    for v in np.flatnonzero(node & (degree > 0)).tolist():
+        for h in leaving[v]:
+            if int(mesh.halfedge_edge[h]) not in used:
+                walk(h)
+    for h in mesh.edge_halfedges[edges, 0].tolist():  # closed curves without a node
+        if int(mesh.halfedge_edge[h]) not in used:
+            node[mesh.tail[h]] = True
+            walk(h)
+    return segments
+
+
+# A link states: scalar ``target`` = sign * scalar ``source`` + shift[t] (t < 0: no shift).
+_Link = tuple[int, int, int, int]
+
+
+def _scalar_links(
+    aligned: AlignedField,
+    turns: Ints,
+    rotation: Ints,
+    wedge: Ints,
+    segments: list[list[int]],
+) -> list[_Link]:
+    mesh = aligned.mesh
+    flat = wedge.reshape(-1)
+    links: list[_Link] = []
+    for s, chain in enumerate(segments):
+        h = np.array(chain)
+        g = mesh.twin[h]
+        r = int(rotation[h[0]])
+        if (rotation[h] != r).any():
+            raise AssertionError("a cut segment changes its rotation")
+        near = np.append(flat[h], flat[next_halfedge(h[-1:])])
+        far = np.append(flat[next_halfedge(g)], flat[g[-1:]])
+        for a, b in zip(near.tolist(), far.tolist(), strict=True):
+            for axis in (0, 1):
+                source, sign = _TURN[r][axis]
+                links.append((2 * a + source, 2 * b + axis, sign, 2 * s + axis))
+    # Each feature edge once; a crease's other side follows from its transition.
+    h = np.flatnonzero(aligned.feature)
+    h = h[(mesh.twin[h] < 0) | (h < mesh.twin[h])]
+    fixed = 1 - (aligned.axis[h] + turns[h // 3]) % 2  # u-parallel edges keep v
+    near, far = 2 * flat[h] + fixed, 2 * flat[next_halfedge(h)] + fixed
+    links.extend((a, b, 1, -1) for a, b in zip(near.tolist(), far.tolist(), strict=True))
+    return links
+
+
+_Row = dict[int, Fraction]
+
+
+def _eliminate(
+    n_scalars: int, n_shifts: int, links: list[_Link]
+) -> tuple[csr_matrix, int, NDArray[np.bool_]]:
+    """Basis of all scalars that satisfy the links, its denominator, and roots of feature links."""
+    adjacency: dict[int, list[int]] = {}
+    for number, (a, b, _, _) in enumerate(links):
+        adjacency.setdefault(a, []).append(number)
+        adjacency.setdefault(b, []).append(number)
+    root: dict[int, int] = {}
+    sign: dict[int, int] = {}
+    shift: dict[int, dict[int, int]] = {}
+    in_tree = [False] * len(links)
+    plain = np.zeros(n_scalars, dtype=bool)
+    for start in adjacency:
+        if start in root:
+            continue
+        root[start], sign[start], shift[start] = start, 1, {}
+        queue = deque([start])
+        while queue:
+            x = queue.popleft()
+            for number in adjacency[x]:
+                a, b, s, t = links[number]
+                y = b if x == a else a
+                if y in root:
+                    continue
+                in_tree[number] = True
+                root[y], sign[y] = root[x], sign[x] * s
+                if t < 0:
+                    shift[y] = shift[x]
+                elif x == a:  # y = s x + t
+                    shift[y] = _plus({k: s * c for k, c in shift[x].items()}, t, 1)
+                else:  # x = s y + t, so y = s x - s t
+                    shift[y] = _plus({k: s * c for k, c in shift[x].items()}, t, -s)
+                queue.append(y)
+    for a, b, _, t in links:
+        if t < 0:
+            plain[a] = plain[b] = True
+
+    # Variables: scalars 0..n_scalars-1, then shifts. Every link off the forest is a relation.
+    relations: list[_Row] = []
+    for number, (a, b, s, t) in enumerate(links):
+        if in_tree[number]:
+            continue
+        row: dict[int, int] = {}
+        for k, c in shift[b].items():
+            row = _plus(row, n_scalars + k, c)
+        for k, c in shift[a].items():
+            row = _plus(row, n_scalars + k, -s * c)
+        if t >= 0:
+            row = _plus(row, n_scalars + t, -1)
+        row = _plus(row, root[b], sign[b] - s * sign[a])
+        if row:
+            relations.append({k: Fraction(c) for k, c in row.items()})
+    solved = _solve(relations)
+
+    rows: list[int] = []
+    cols: list[int] = []
+    values: list[Fraction] = []
+    for x, base in root.items():
+        terms: _Row = {}
+        _add(terms, solved, base, Fraction(sign[x]))
+        for k, c in shift[x].items():
+            _add(terms, solved, n_scalars + k, Fraction(c))
+        for k, value in terms.items():
+            rows.append(x)
+            cols.append(k)
+            values.append(value)
+    denominator = int(np.lcm.reduce([v.denominator for v in values])) if values else 1
+    free = np.setdiff1d(np.arange(n_scalars), np.array(list(root), dtype=np.int64))
+    row_index = np.concatenate([free, np.array(rows, dtype=np.int64)])
+    col_index = np.concatenate([free, np.array(cols, dtype=np.int64)])
+    entry = np.concatenate(
+        [
+            np.full(len(free), denominator, dtype=np.int64),
+            np.array([int(v * denominator) for v in values], dtype=np.int64),
+        ]
+    )
+    used, packed = np.unique(col_index, return_inverse=True)
+    basis = csr_matrix((entry, (row_index, packed)), shape=(n_scalars, len(used)))
+    return basis, denominator, plain
+
+
+def _plus(row: dict[int, int], key: int, amount: int) -> dict[int, int]:
+    """A copy of a sparse integer row with ``amount`` added at ``key``; zeros are dropped."""
+    out = dict(row)
+    value = out.get(key, 0) + amount
+    if value:
+        out[key] = value
+    else:
+        out.pop(key, None)
+    return out
+
+
+def _add(row: _Row, solved: dict[int, _Row], key: int, factor: Fraction) -> None:
+    """Add ``factor`` times a variable to a row in place, written in unsolved variables."""
+    if not factor:
+        return
+    for k, c in solved.get(key, {key: Fraction(1)}).items():
+        value = row.get(k, Fraction(0)) + factor * c
+        if value:
+            row[k] = value
+        else:
+            row.pop(k, None)
+
+
+def _solve(relations: list[_Row]) -> dict[int, _Row]:
+    """Reduced elimination: some variables as combinations of the others."""
+    solved: dict[int, _Row] = {}
+    uses: dict[int, set[int]] = {}
+    for relation in sorted(relations, key=len):
+        row: _Row = {}
+        for k, c in relation.items():
+            _add(row, solved, k, c)
+        if not row:
+            continue
+        # Units first (they keep the lattice integral), then rare variables (they keep it sparse).
+        pivot = min(row, key=lambda k: (abs(row[k]) != 1, abs(row[k]), len(uses.get(k, ())), k))
+        scale = -1 / row.pop(pivot)
+        value = {k: c * scale for k, c in row.items()}
+        for user in uses.pop(pivot, set()):
+            factor = solved[user].pop(pivot)
+            for k, c in value.items():
+                total = solved[user].get(k, Fraction(0)) + factor * c
+                if total:
+                    solved[user][k] = total
+                    uses.setdefault(k, set()).add(user)
+                else:
+                    solved[user].pop(k, None)
+                    uses.get(k, set()).discard(user)
+        solved[pivot] = value
+        for k in value:
+            uses.setdefault(k, set()).add(pivot)
+    return solved

@@ -1,0 +1,275 @@
+"""A seamless map without flips that follows a cross field, rounded to exact integer coordinates.
+
+The map minimises ``sum_f w_f A_f |grad (u, v) - s_f (X, X_perp)|^2`` over the seamless space
+(Bommes et al. 2009, eq. 5, without any rounding of singularities), with the weights of folded and
+strongly distorted triangles doubled until no triangle is folded (local stiffening, ibid. 5.4) and
+the map turns by the right angle around every vertex.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix, diags
+from scipy.sparse.linalg import splu
+
+from vhquad.field.align import AlignedField
+from vhquad.mesh.triangle import TriMesh, next_halfedge
+from vhquad.quad.seamless import SeamlessSpace, seamless_space
+
+__all__ = ["SeamlessMap", "solve_seamless_map"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+UNITS_PER_EDGE = 1 << 20
+"""Integer units in a mean mesh edge: fine enough for any triangle, and products stay in int64."""
+
+
+@dataclass(frozen=True, eq=False)
+class SeamlessMap:
+    """Integer coordinates of the corners and the exact transitions between charts.
+
+    Attributes
+    ----------
+    uv : (m, 3, 2) int64
+        Coordinates of corner k of face f in the chart of f.
+    unit : float
+        Parametric length of one integer unit: ``uv * unit`` is in wanted quad edges if the field
+        has sizes, in mesh units otherwise.
+    rotation : (3m,) int64
+        r of ``z_g = i^r z_f + t``, for the halfedge of f whose twin lies in g.
+    translation : (3m, 2) int64
+        t of the same; zero on boundaries.
+    flips : int
+        Triangles that are not positively oriented.
+    wrong_angles : int
+        Sectors around which the map does not turn by ``sector_quads`` quarter turns.
+    solves : int
+        Linear systems solved.
+    """
+
+    uv: Ints
+    unit: float
+    rotation: Ints
+    translation: Ints
+    flips: int
+    wrong_angles: int
+    solves: int
+
+    @property
+    def is_valid(self) -> bool:
+        """No folded triangle and the right angle around every vertex."""
+        return self.flips == 0 and self.wrong_angles == 0
+
+    @property
+    def area(self) -> float:
+        """Area of the image, in squared parametric units."""
+        return float(twice_area(self.uv).sum() * 0.5 * self.unit**2)
+
+
+def twice_area(uv: Ints) -> Ints:
+    """Twice the signed area of each triangle, exactly; (m,)."""
+    a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+
+
+def solve_seamless_map(
+    aligned: AlignedField,
+    *,
+    max_solves: int = 20,
+    on_solve: Callable[[int, int], None] | None = None,
+) -> SeamlessMap:
+    """Seamless map of an aligned field; check ``is_valid`` on the result.
+
+    Parameters
+    ----------
+    aligned : AlignedField
+    max_solves : int
+        Bound on the number of stiffening rounds.
+    on_solve : callable, optional
+        Called with (round, folded triangles) after each solve.
+    """
+    space = seamless_space(aligned)
+    problem = _Problem(aligned, space)
+    weight = np.ones(aligned.mesh.n_faces)
+    best: SeamlessMap | None = None
+    for number in range(1, max_solves + 1):
+        unknowns = problem.solve(weight)
+        candidate = _snap(aligned, space, problem, unknowns, number)
+        if on_solve is not None:
+            on_solve(number, candidate.flips)
+        if best is None or (candidate.flips, candidate.wrong_angles) < (
+            best.flips,
+            best.wrong_angles,
+        ):
+            best = candidate
+        if candidate.is_valid:
+            return candidate
+        weight = problem.stiffen(weight, unknowns)
+    assert best is not None
+    return best
+
+
+class _Problem:
+    """The quadratic energy over the seamless space."""
+
+    def __init__(self, aligned: AlignedField, space: SeamlessSpace) -> None:
+        mesh = aligned.mesh
+        self.mesh = mesh
+        self.wedge = space.wedge
+        size = np.ones(mesh.n_faces) if aligned.size is None else aligned.size
+        self.stretch = 1.0 / size
+        local = _local_corners(mesh)
+        # d/dz-bar and d/dz of the map in the face's frame come from these gradients.
+        opposite = np.roll(local, 1, axis=1) - np.roll(local, -1, axis=1)
+        area = np.maximum(mesh.face_areas, 1e-12 * mesh.face_areas.max())
+        self.gradient = 1j * opposite / (2 * area[:, None])  # (m, 3) complex
+        self.area = area
+        self.target = self.stretch * np.exp(1j * space.angle)
+        self.basis = (space.basis / space.denominator).tocsr()
+        self.transpose = self.basis.T.tocsr()
+        self.denominator = space.denominator
+
+    def solve(self, weight: Floats) -> Floats:
+        """Minimiser for the given face weights; (d,)."""
+        wa = weight * self.area
+        g = self.gradient
+        local = wa[:, None, None] * (g[:, :, None] * g[:, None, :].conj()).real
+        n = self.basis.shape[0] // 2
+        i = np.repeat(self.wedge, 3, axis=1).ravel()
+        j = np.tile(self.wedge, (1, 3)).ravel()
+        laplacian = coo_matrix((local.ravel(), (i, j)), shape=(n, n)).tocsr()
+        half = laplacian.tocoo()
+        full = coo_matrix(
+            (
+                np.concatenate([half.data, half.data]),
+                (
+                    np.concatenate([2 * half.row, 2 * half.row + 1]),
+                    np.concatenate([2 * half.col, 2 * half.col + 1]),
+                ),
+            ),
+            shape=(2 * n, 2 * n),
+        ).tocsr()
+        right = np.zeros(2 * n)
+        flat = self.wedge.ravel()
+        for axis, target in ((0, self.target), (1, 1j * self.target)):
+            pull = wa[:, None] * (g.conj() * target[:, None]).real
+            np.add.at(right, 2 * flat + axis, pull.ravel())
+        matrix = (self.transpose @ full @ self.basis).tocsc()
+        # Charts may drift together where nothing ties them down: hold them softly. The wanted
+        # gradients do not care, so a weak pull on all unknowns changes nothing visible.
+        matrix = matrix + diags(np.full(matrix.shape[0], 1e-9 * matrix.diagonal().mean()))
+        return np.asarray(
+            splu(
+                matrix.tocsc(),
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=0.0,
+                options={"SymmetricMode": True},
+            ).solve(self.transpose @ right)
+        )
+
+    def corners(self, unknowns: Floats) -> NDArray[np.complex128]:
+        """Chart coordinates of the corners; (m, 3) complex."""
+        flat = self.basis @ unknowns
+        z = flat[0::2] + 1j * flat[1::2]
+        return np.asarray(z[self.wedge])
+
+    def stiffen(self, weight: Floats, unknowns: Floats) -> Floats:
+        """Doubled weights on folded and distorted triangles and their neighbours."""
+        z = self.corners(unknowns)
+        # Complex derivatives: gradients are d/dx + i d/dy of the hat functions.
+        holomorphic = 0.5 * (z * self.gradient.conj()).sum(axis=1)
+        anti = 0.5 * (z * self.gradient).sum(axis=1)
+        jacobian = (np.abs(holomorphic) ** 2 - np.abs(anti) ** 2) / self.stretch**2
+        off = 2 * (
+            np.abs(holomorphic / self.target.conj() - 1) ** 2 + np.abs(anti / self.target) ** 2
+        )
+        bad = (jacobian < 0.1) | (off > 1.5**2)
+        grown = bad.copy()
+        touched = np.zeros(self.mesh.n_vertices, dtype=bool)
+        touched[self.mesh.faces[bad]] = True
+        grown |= touched[self.mesh.faces].any(axis=1)
+        return np.where(grown, np.minimum(2 * weight, 50.0 * 2), weight)
+
+
+def _local_corners(mesh: TriMesh) -> NDArray[np.complex128]:
+    """Corners of each face in its own frame (origin at corner 0, axis along halfedge 0)."""
+    length = mesh.edge_lengths
+    angle = mesh.corner_angles[:, 0]
+    out = np.zeros((mesh.n_faces, 3), dtype=np.complex128)
+    out[:, 1] = length[:, 0]
+    out[:, 2] = length[:, 2] * np.exp(1j * angle)
+    return out
+
+
+def _snap(
+    aligned: AlignedField,
+    space: SeamlessSpace,
+    problem: _Problem,
+    unknowns: Floats,
+    solves: int,
+) -> SeamlessMap:
+    """Round to integers: seamless to the last bit, and no ordinary vertex on a special isoline.
+
+    Unknowns that place special vertices and features become multiples of 4, the others odd: an
+    isoline through a special vertex then meets other vertices only where the constraints make it.
+    """
+    mesh = aligned.mesh
+    z = problem.corners(unknowns)
+    mean_edge = float(np.abs(np.roll(z, -1, axis=1) - z).mean())
+    unit = mean_edge / UNITS_PER_EDGE
+    scaled = unknowns / (unit * space.denominator)
+    multiple = np.where(space.even, 4 * np.round(scaled / 4), 2 * np.floor(scaled / 2) + 1)
+    flat = space.basis @ multiple.astype(np.int64)
+    uv = np.stack([flat[0::2], flat[1::2]], axis=1)[space.wedge]
+    translation = np.zeros((3 * mesh.n_faces, 2), dtype=np.int64)
+    h = np.flatnonzero(mesh.twin >= 0)
+    corners = uv.reshape(-1, 2)
+    for near, far in ((h, next_halfedge(mesh.twin[h])), (next_halfedge(h), mesh.twin[h])):
+        shift = corners[far] - rotate(corners[near], space.rotation[h])
+        if near is h:
+            translation[h] = shift
+        elif (translation[h] != shift).any():
+            raise AssertionError("the snapped map is not seamless")
+    flips = int((twice_area(uv) <= 0).sum())
+    return SeamlessMap(
+        uv=uv,
+        unit=unit,
+        rotation=space.rotation,
+        translation=translation,
+        flips=flips,
+        wrong_angles=_wrong_angles(aligned, uv),
+        solves=solves,
+    )
+
+
+def rotate(z: Ints, quarter: Ints) -> Ints:
+    """Integer pairs turned by quarter turns, elementwise; (q, 2)."""
+    u, v = z[:, 0], z[:, 1]
+    q = quarter % 4
+    return np.stack(
+        [
+            np.choose(q, [u, -v, -u, v]),
+            np.choose(q, [v, u, -v, -u]),
+        ],
+        axis=1,
+    )
+
+
+def _wrong_angles(aligned: AlignedField, uv: Ints) -> int:
+    p = uv.astype(np.float64)
+    forward = np.roll(p, -1, axis=1) - p
+    backward = np.roll(p, 1, axis=1) - p
+    sine = forward[..., 0] * backward[..., 1] - forward[..., 1] * backward[..., 0]
+    cosine = (forward * backward).sum(axis=2)
+    total = np.bincount(
+        aligned.sector.ravel(),
+        weights=np.arctan2(sine, cosine).ravel(),
+        minlength=len(aligned.sector_quads),
+    )
+    wanted = aligned.sector_quads * (np.pi / 2)
+    return int((np.abs(total - wanted) > 0.1).sum())
