@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.triangle import TriMesh
 
 Floats = NDArray[np.float64]
@@ -183,6 +184,26 @@ def punctured_torus() -> TriMesh:
     """A torus that lacks one vertex's ring: genus 1, one boundary loop."""
     mesh = torus()
     return mesh.submesh((mesh.faces != 5).all(axis=1))[0]
+
+
+# ---- quads ----------------------------------------------------------------------------------
+
+
+def quad_grid(nx: int = 4, ny: int = 3, width: float = 1.0, height: float = 0.75) -> QuadMesh:
+    """Flat rectangle of nx x ny equal quads facing +z."""
+    return QuadMesh(grid(nx, ny, width, height).vertices, _squares(nx + 1, ny + 1))
+
+
+def quad_torus(nu: int = 24, nv: int = 12, major: float = 1.0, minor: float = 0.4) -> QuadMesh:
+    """The torus above without diagonals: all vertices regular."""
+    points = torus(nu, nv, major, minor).vertices
+    return QuadMesh(points, _squares(nu, nv, wrap_u=True, wrap_v=True))
+
+
+def quad_cube(n: int = 4, side: float = 1.0) -> QuadMesh:
+    """Cube of 6 n^2 squares: eight vertices of valence 3, none other irregular."""
+    v, q = _voxel_quads(np.ones((n, n, n), dtype=bool), side / n)
+    return QuadMesh(v, q)
 
 
 # ---- many parts, transforms -----------------------------------------------------------------
@@ -455,17 +476,22 @@ def _turn(n: int) -> Floats:
 
 def _lattice(nu: int, nv: int, wrap_u: bool = False, wrap_v: bool = False) -> Ints:
     """Faces of an nu x nv lattice of vertices (index u * nv + v), counter-clockwise in (u, v)."""
+    q = _squares(nu, nv, wrap_u, wrap_v)
+    return np.stack([q[:, [0, 1, 2]], q[:, [0, 2, 3]]], axis=1).reshape(-1, 3)
+
+
+def _squares(nu: int, nv: int, wrap_u: bool = False, wrap_v: bool = False) -> Ints:
     u, v = np.meshgrid(
         np.arange(nu if wrap_u else nu - 1), np.arange(nv if wrap_v else nv - 1), indexing="ij"
     )
     u, v = u.reshape(-1), v.reshape(-1)
     a, b = u * nv + v, (u + 1) % nu * nv + v
     c, d = (u + 1) % nu * nv + (v + 1) % nv, u * nv + (v + 1) % nv
-    return np.stack([a, b, c, a, c, d], axis=1).reshape(-1, 3)
+    return np.stack([a, b, c, d], axis=1)
 
 
-def _voxel_arrays(solid: NDArray[np.bool_], size: float) -> Soup:
-    """Outer squares of a set of voxels, each cut in two; centred at 0."""
+def _voxel_quads(solid: NDArray[np.bool_], size: float) -> Soup:
+    """Outer squares of a set of voxels; centred at 0."""
     padded = np.pad(solid, 1)
     corners = []
     for axis in range(3):
@@ -478,8 +504,12 @@ def _voxel_arrays(solid: NDArray[np.bool_], size: float) -> Soup:
             corners.append(square if outward else square[:, ::-1])
     quads = np.concatenate(corners)
     points, index = np.unique(quads.reshape(-1, 3), axis=0, return_inverse=True)
-    q = index.reshape(-1, 4)
-    v = (points - np.array(padded.shape) / 2.0) * size
+    return (points - np.array(padded.shape) / 2.0) * size, index.reshape(-1, 4)
+
+
+def _voxel_arrays(solid: NDArray[np.bool_], size: float) -> Soup:
+    """The same squares, each cut in two."""
+    v, q = _voxel_quads(solid, size)
     return v, np.stack([q[:, [0, 1, 2]], q[:, [0, 2, 3]]], axis=1).reshape(-1, 3)
 
 
