@@ -18,7 +18,8 @@ from vhquad.errors import MeshError
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.distortion import corner_jacobians, distortion, quad_normals
-from vhquad.quad.smooth import folded_quads, smooth_quads, smoothed_sizes
+from vhquad.quad.sliding import folded_quads
+from vhquad.quad.smooth import smooth_quads, smoothed_sizes
 
 NOBODY = np.zeros(0, dtype=np.int64)
 

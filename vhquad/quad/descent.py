@@ -1,0 +1,164 @@
+"""Minimisation of quad distortion over tangential moves: spread first, then a barrier descent.
+
+Both steps use one factor of the quad mesh's graph Laplacian. `spread` fits a square to each quad
+and solves for the edges of all squares at once (local/global, Bouaziz et al. 2012): crowded or
+folded strips open over the whole neighbourhood within a few steps. `descend` minimises the
+barrier energy of :mod:`vhquad.quad.distortion` by L-BFGS with the Laplacian as first guess of the
+Hessian (Liu, Bouaziz & Kavan 2017).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix, diags_array
+from scipy.sparse.linalg import SuperLU, splu
+
+from vhquad.quad.distortion import cross, distortion, unit
+from vhquad.quad.sliding import (
+    SIZE_WEIGHT,
+    Problem,
+    State,
+    place,
+    reference_normals,
+    tangential,
+)
+
+__all__ = ["better", "descend", "laplacian_factor", "spread"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+MEMORY = 6
+SQUARE_RANGE = (0.5, 2.0)  # of the wanted size, for the squares of `spread`
+
+
+def better(a: State, b: State) -> bool:
+    """Whether a has fewer folded quads than b, or as many and less energy."""
+    return (int(a.folded.sum()), a.energy) < (int(b.folded.sum()), b.energy)
+
+
+def spread(problem: Problem, state: State, factor: SuperLU, iterations: int) -> State:
+    """Move vertices so that quads come near their own best-fitting squares; the last state."""
+    quads = problem.quads
+    low, high = SQUARE_RANGE[0] * problem.size, SQUARE_RANGE[1] * problem.size
+    corners = quads.reshape(-1)
+    for _ in range(iterations):
+        n = reference_normals(problem, state.normals)
+        p = state.vertices[quads]
+        edge = p[:, [1, 2, 3, 0]] - p
+        # Edges of a square: d, n x d, -d, -(n x d); the least squares fit of d, in the plane.
+        d = edge[:, 0] - edge[:, 2] + cross(edge[:, 1] - edge[:, 3], n)
+        d -= np.einsum("ki,ki->k", d, n)[:, None] * n
+        side = np.clip(0.25 * np.sqrt(np.einsum("ki,ki->k", d, d)), low, high)
+        d = side[:, None] * unit(d)
+        turned = cross(n, d)
+        wanted = np.stack([d, turned, -d, -turned], axis=1)
+        pull = (wanted - edge) / (problem.size**2)[:, None, None]
+        force = pull[:, [3, 0, 1, 2]] - pull
+        total = [
+            np.bincount(corners, force[..., i].reshape(-1), len(problem.fixed)) for i in range(3)
+        ]
+        force = tangential(problem, state, np.stack(total, axis=1))
+        move = tangential(problem, state, _solve(problem, factor, force))
+        length = _longest(problem, move)
+        state = place(problem, state.vertices + min(1.0, 1.0 / max(length, 1e-300)) * move, state)
+        if length < 1e-3:
+            break
+    return state
+
+
+def _longest(problem: Problem, move: Floats) -> float:
+    """The longest move in units of the wanted edge length near its vertex."""
+    return float((np.linalg.norm(move, axis=1) / problem.reach)[~problem.fixed].max())
+
+
+def laplacian_factor(problem: Problem) -> SuperLU:
+    """Factor of the graph Laplacian (weights 1/size², a 1 % mass) over the vertices that move."""
+    n = len(problem.fixed)
+    free = np.flatnonzero(~problem.fixed)
+    tail = problem.quads.T.reshape(-1)
+    head = np.roll(problem.quads, -1, axis=1).T.reshape(-1)
+    weight = np.tile(1.0 / problem.size**2, 4)
+    half = coo_matrix((weight, (tail, head)), shape=(n, n)).tocsr()
+    adjacency = half + half.T
+    degree = np.asarray(adjacency.sum(axis=1)).reshape(-1)
+    laplacian = (diags_array(1.01 * degree) - adjacency).tocsr()[free][:, free].tocsc()
+    return splu(
+        laplacian,
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True},
+    )
+
+
+def _solve(problem: Problem, factor: SuperLU, a: Floats) -> Floats:
+    """Inverse Laplacian of vectors at the vertices, 0 where fixed."""
+    out = np.zeros_like(a)
+    free = ~problem.fixed
+    out[free] = factor.solve(a[free])
+    return out
+
+
+def _epsilon(area: Floats) -> float:
+    """Width of the barrier: wide while corners are folded, then almost sharp."""
+    least = float(area.min())
+    return 1e-3 if least > 0.02 else min(0.3, max(1e-3, 0.16 * np.sqrt(max(-least, 0.0))))
+
+
+def descend(problem: Problem, state: State, factor: SuperLU, iterations: int) -> State:
+    """Minimise the barrier energy; the best state met (`better`), the given one included."""
+    best = state
+    history: list[tuple[Floats, Floats]] = []
+    gradient, moved = np.zeros((0, 3)), np.zeros((0, 3))
+    for _ in range(iterations):
+        args = (problem.quads, state.quad_normals, problem.size)
+        epsilon = _epsilon(distortion(state.vertices, *args, 1.0, SIZE_WEIGHT, False).area)
+        now = distortion(state.vertices, *args, epsilon, SIZE_WEIGHT)
+        last, gradient = gradient, tangential(problem, state, now.gradient)
+        if len(last):
+            step, change = tangential(problem, state, moved), gradient - last
+            if (step * change).sum() > 1e-8 * np.linalg.norm(step) * np.linalg.norm(change):
+                history = [*history, (step, change)][-MEMORY:]
+        move = -tangential(problem, state, _two_loop(problem, gradient, history, factor))
+        slope = float((move * gradient).sum())
+        if slope >= 0:
+            history = []
+            move = -gradient * problem.reach[:, None] ** 2
+            slope = float((move * gradient).sum())
+            if slope >= 0:
+                break
+        length = _longest(problem, move)
+        scale = min(1.0, 1.0 / length)
+        for _ in range(12):
+            ahead = state.vertices + scale * move
+            trial = distortion(ahead, *args, epsilon, SIZE_WEIGHT, False).energy
+            if trial <= now.energy + 1e-4 * scale * slope:
+                break
+            scale *= 0.5
+        following = place(problem, state.vertices + scale * move, state)
+        moved, state = following.vertices - state.vertices, following
+        if better(state, best):
+            best = state
+        if scale * length < 1e-7:
+            break
+    return best
+
+
+def _two_loop(
+    problem: Problem, gradient: Floats, history: list[tuple[Floats, Floats]], factor: SuperLU
+) -> Floats:
+    """L-BFGS inverse Hessian times the gradient, the factored Laplacian in the middle."""
+    q = gradient.copy()
+    shares = []
+    for s, y in reversed(history):
+        share = (s * q).sum() / (s * y).sum()
+        shares.append(share)
+        q -= share * y
+    z = _solve(problem, factor, q)
+    if history:
+        s, y = history[-1]
+        z *= (s * y).sum() / (y * _solve(problem, factor, y)).sum()
+    for (s, y), share in zip(history, reversed(shares), strict=True):
+        z += (share - (y * z).sum() / (s * y).sum()) * s
+    return z

@@ -1,0 +1,135 @@
+"""Where the vertices of a quad mesh are on a surface, and how they may move on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vhquad.mesh.closest import ClosestPoints
+from vhquad.quad.curves import CurveConstraints
+from vhquad.quad.distortion import corner_jacobians, distortion, quad_normals, unit
+
+__all__ = [
+    "SIZE_WEIGHT",
+    "Problem",
+    "State",
+    "folded_quads",
+    "make_problem",
+    "measure",
+    "place",
+    "reference_normals",
+    "tangential",
+]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+SIZE_WEIGHT = 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What stays the same while vertices move."""
+
+    quads: Ints
+    surface: ClosestPoints
+    curves: CurveConstraints
+    fixed: Bools
+    size: Floats  # (k,) wanted edge length of each quad
+    on_curve: Ints  # vertices that slide on a curve
+    reach: Floats  # (n,) least wanted edge length around each vertex: the longest step
+    trust: Floats  # (n,) weight of a vertex's surface normal in its quads' reference normals
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Where the vertices are, and what follows from it."""
+
+    vertices: Floats
+    arc: Floats  # (n,) arc length of ``on_curve`` vertices on their curves, 0 elsewhere
+    normals: Floats  # (n, 3) surface normals
+    quad_normals: Floats  # (k, 3) reference normals of the energy
+    folded: Bools  # (k,)
+    energy: float  # at the least epsilon, to rank states
+
+
+def folded_quads(vertices: Floats, quads: Ints, surface_normals: Floats) -> Bools:
+    """Quads with a corner turned over against their own normal, or turned against the surface.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+    quads : (k, 4) int64
+    surface_normals : (k, 3) float64
+        Normal of the surface near each quad, any length.
+    """
+    own = quad_normals(vertices, quads)
+    turned = np.einsum("ki,ki->k", own, surface_normals) <= 0
+    return np.asarray((corner_jacobians(vertices, quads, own) <= 0).any(axis=1) | turned)
+
+
+def make_problem(
+    quads: Ints, surface: ClosestPoints, curves: CurveConstraints, fixed: Bools, size: Floats
+) -> Problem:
+    """Derive what stays the same from the parts of the problem."""
+    reach = np.full(len(fixed), np.inf)
+    np.minimum.at(reach, quads.reshape(-1), np.repeat(size, 4))
+    sliding = (curves.curve >= 0) & ~fixed
+    # A crease has two normals: prefer those of a quad's plain vertices.
+    trust = np.where(curves.curve >= 0, 0.01, 1.0)
+    return Problem(quads, surface, curves, fixed, size, np.flatnonzero(sliding), reach, trust)
+
+
+def place(problem: Problem, wanted: Floats, before: State | None) -> State:
+    """Bring wanted positions back to the surface and the curves."""
+    mesh, line = problem.surface.mesh, problem.on_curve
+    hits = problem.surface.query(wanted)
+    normals = mesh.vertex_normals[mesh.faces[hits.face]]
+    normals = unit(np.einsum("qk,qki->qi", hits.barycentric, normals))
+    x = np.array(hits.point)
+    if before is None:
+        arc = np.zeros(len(x))
+        arc[line] = problem.curves.locate(line, wanted[line])
+        x[problem.fixed] = wanted[problem.fixed]
+    else:
+        tangent = problem.curves.tangent(line, before.arc[line], 0.25 * problem.reach[line])
+        along = np.einsum("vi,vi->v", wanted[line] - before.vertices[line], tangent)
+        arc = before.arc.copy()
+        arc[line] = problem.curves.wrap(line, arc[line] + along)
+        wrong_side = np.einsum("vi,vi->v", normals, before.normals) < 0.2
+        wrong_side[line] = False
+        keep = problem.fixed | wrong_side
+        x[keep], normals[keep] = before.vertices[keep], before.normals[keep]
+    x[line] = problem.curves.position(line, arc[line])
+    return measure(problem, x, arc, normals)
+
+
+def measure(problem: Problem, x: Floats, arc: Floats, normals: Floats) -> State:
+    """The state of given positions, arc lengths and vertex normals."""
+    quads = problem.quads
+    around = reference_normals(problem, normals)
+    folded = folded_quads(x, quads, around)
+    own = quad_normals(x, quads)
+    trusted = ~folded & (np.einsum("ki,ki->k", own, around) > 0.3)
+    reference = np.where(trusted[:, None], own, around)
+    energy = distortion(x, quads, reference, problem.size, 1e-3, SIZE_WEIGHT, False).energy
+    return State(x, arc, normals, reference, folded, energy)
+
+
+def reference_normals(problem: Problem, normals: Floats) -> Floats:
+    """Unit surface normal of each quad, the mean over its corners; (k, 3)."""
+    quads = problem.quads
+    return unit(np.einsum("kc,kci->ki", problem.trust[quads], normals[quads]))
+
+
+def tangential(problem: Problem, state: State, a: Floats) -> Floats:
+    """The part of vectors at the vertices along which these can move."""
+    out = a - np.einsum("vi,vi->v", a, state.normals)[:, None] * state.normals
+    line = problem.on_curve
+    t = problem.curves.tangent(line, state.arc[line], 0.25 * problem.reach[line])
+    out[line] = np.einsum("vi,vi->v", a[line], t)[:, None] * t
+    out[problem.fixed] = 0.0
+    return out
