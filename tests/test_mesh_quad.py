@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from tests import meshes
 from tests.data_paths import data_file
 from vhquad.errors import MeshError
+from vhquad.mesh.io import read_quad_mesh
 from vhquad.mesh.quad import QuadMesh
 
 
@@ -127,8 +128,6 @@ def test_any_soup_has_figures(quads: list[list[int]]) -> None:
     ],
 )
 def test_figures_of_known_models(name: str, loops: int, genus: int, irregular: int) -> None:
-    from vhquad.mesh.io import read_quad_mesh
-
     q = read_quad_mesh(data_file("quads", f"{name}.obj"))
     assert q.is_manifold
     assert (q.n_boundary_loops, q.genus) == (loops, genus)
