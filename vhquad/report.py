@@ -1,0 +1,269 @@
+"""The report of a remesh: what was asked, what was made, how it was made; plain JSON in and out."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import platform
+import types
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, is_dataclass
+from importlib import metadata
+from typing import TYPE_CHECKING, Any, TypeVar, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from vhquad import __version__
+from vhquad.atomic import write_atomic
+from vhquad.errors import ConfigError
+from vhquad.mesh.quad import QuadMesh
+
+if TYPE_CHECKING:
+    from vhquad.mesh.quality import QualityReport
+    from vhquad.mesh.triangle import TriMesh
+
+__all__ = [
+    "ComponentReport",
+    "MeshCounts",
+    "RemeshReport",
+    "from_plain",
+    "plain",
+    "versions",
+    "write_json",
+]
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class MeshCounts:
+    """Size and topology of a mesh, of triangles or quads.
+
+    Attributes
+    ----------
+    vertices, faces, components, euler_characteristic, boundary_loops : int
+    """
+
+    vertices: int
+    faces: int
+    components: int
+    euler_characteristic: int
+    boundary_loops: int
+
+    @classmethod
+    def of(cls, mesh: TriMesh | QuadMesh) -> MeshCounts:
+        """Count a mesh."""
+        if isinstance(mesh, QuadMesh):
+            faces, loops = mesh.n_quads, mesh.n_boundary_loops
+        else:
+            faces, loops = mesh.n_faces, len(mesh.boundary_loops)
+        return cls(mesh.n_vertices, faces, mesh.n_components, mesh.euler_characteristic, loops)
+
+    @property
+    def topology(self) -> tuple[int, int, int]:
+        """(components, Euler characteristic, boundary loops): what a remesh must keep."""
+        return (self.components, self.euler_characteristic, self.boundary_loops)
+
+
+@dataclass(frozen=True)
+class ComponentReport:
+    """How the quads of one connected component were made.
+
+    Attributes
+    ----------
+    vertices, faces : int
+        Size of the component after repair.
+    target : int
+        Its share of the quads asked for.
+    made : int
+        Quads made.
+    method : str
+        "integer-grid map", or the name of the fallback that was used.
+    reason : str
+        Why a fallback was used; empty if none was.
+    singularities : dict of int to int
+        Index in quarters (1 is +1/4, a vertex of valence 3) to how many the field has.
+    cancelled : int
+        Pairs of opposite singularities too close for a quad between them, removed beforehand.
+    seconds : dict of str to float
+        Wall time of each step.
+    warnings : tuple of str
+    """
+
+    vertices: int
+    faces: int
+    target: int
+    made: int
+    method: str
+    reason: str = ""
+    singularities: Mapping[int, int] = field(default_factory=dict)
+    cancelled: int = 0
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class RemeshReport:
+    """What one remesh was asked for, what it made and how; written even if it fell short.
+
+    Attributes
+    ----------
+    asked : int
+        Quads asked for: the target, or the number that the field's or the given size amounts to.
+    made : int
+        Quads in the result.
+    input, output : MeshCounts
+        The repaired input, and the result.
+    quality : QualityReport or None
+        Figures of the result against the input.
+    components : tuple of ComponentReport
+        In the order of the input's components.
+    repair : tuple of str
+        What was repaired in the input, a line each.
+    seconds : dict of str to float
+        Wall time of each step, all components together.
+    warnings : tuple of str
+        What a user should know before using the result.
+    settings : dict
+        Every setting of the run, seed included.
+    versions : dict of str to str
+        Of this package, Python and the libraries that decide the result.
+    """
+
+    asked: int
+    made: int
+    input: MeshCounts
+    output: MeshCounts
+    quality: QualityReport | None = None
+    components: tuple[ComponentReport, ...] = ()
+    repair: tuple[str, ...] = ()
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    versions: Mapping[str, str] = field(default_factory=lambda: versions())
+
+    @property
+    def fallbacks(self) -> tuple[ComponentReport, ...]:
+        """The components that needed another way than the integer-grid map."""
+        return tuple(part for part in self.components if part.reason)
+
+    @property
+    def topology_kept(self) -> bool:
+        """Whether components, Euler characteristic and boundary loops are those of the input."""
+        return self.input.topology == self.output.topology
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain JSON values; :meth:`from_dict` reads them back."""
+        values = plain(self)
+        values["topology_kept"] = self.topology_kept
+        return dict(values)
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> RemeshReport:
+        """The report that :meth:`to_dict` wrote.
+
+        Raises
+        ------
+        ConfigError
+            If something is missing or of another kind.
+        """
+        known = {f.name for f in fields(cls)}
+        report: RemeshReport = from_plain(cls, {k: v for k, v in values.items() if k in known})
+        return report
+
+
+# ---- JSON -----------------------------------------------------------------------------------
+
+
+def plain(value: Any) -> Any:
+    """Dataclasses, tuples, paths and numpy values as plain JSON values; NaN becomes null."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return {f.name: plain(getattr(value, f.name)) for f in fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple | set | frozenset):
+        return [plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    return os.fspath(value) if isinstance(value, os.PathLike) else str(value)
+
+
+def from_plain(kind: Any, value: Any) -> Any:
+    """The inverse of :func:`plain`, led by type hints.
+
+    Parameters
+    ----------
+    kind : type
+        A dataclass, or what may stand in its hints: a tuple, list, mapping, optional or number.
+    value : object
+        Plain JSON values.
+
+    Raises
+    ------
+    ConfigError
+        If the value does not fit.
+    """
+    origin, inner = get_origin(kind), get_args(kind)
+    if is_dataclass(kind) and isinstance(kind, type):
+        return _dataclass_from(kind, value)
+    if origin in (Union, types.UnionType):
+        if value is None:
+            return math.nan if type(None) not in inner else None
+        return from_plain(next(k for k in inner if k is not type(None)), value)
+    if origin in (tuple, list):
+        made = [from_plain(inner[0] if inner else Any, item) for item in value]
+        return made if origin is list else tuple(made)
+    if origin is not None and issubclass(origin, Mapping):
+        key_kind, item_kind = inner
+        as_key = int if key_kind is int else str
+        return {as_key(k): from_plain(item_kind, item) for k, item in value.items()}
+    if kind is float:
+        return math.nan if value is None else float(value)
+    return value
+
+
+def _dataclass_from(kind: type, value: Any) -> Any:
+    if not isinstance(value, Mapping):
+        raise ConfigError(f"{kind.__name__}: a JSON object was expected, not {value!r}")
+    hints = get_type_hints(kind, localns=_late_names())
+    try:
+        return kind(**{name: from_plain(hints.get(name, Any), v) for name, v in value.items()})
+    except TypeError as error:
+        raise ConfigError(f"{kind.__name__} does not fit: {error}") from None
+
+
+def _late_names() -> dict[str, Any]:
+    """Types named in hints that this module imports for type checking only."""
+    from vhquad.mesh.quality import QualityReport
+
+    return {"QualityReport": QualityReport}
+
+
+def write_json(path: str | os.PathLike[str], value: Any) -> None:
+    """Write a report, or any value that :func:`plain` takes, as an indented JSON file, atomically.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    content = value.to_dict() if isinstance(value, RemeshReport) else plain(value)
+    write_atomic(path, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
+
+
+def versions() -> dict[str, str]:
+    """Versions of this package, Python and the libraries that decide the result."""
+    found = {"vhquad": __version__, "python": platform.python_version()}
+    for name in ("numpy", "scipy", "torch", "libigl"):
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found[name] = "not installed"
+    return found
