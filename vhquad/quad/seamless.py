@@ -23,7 +23,7 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components
 from vhquad.field.align import AlignedField
 from vhquad.mesh.triangle import next_halfedge
 
-__all__ = ["SeamlessSpace", "seamless_space", "special_vertices"]
+__all__ = ["SeamlessSpace", "irregular_vertices", "seamless_space", "special_vertices"]
 
 Ints = NDArray[np.int64]
 
@@ -96,32 +96,44 @@ def seamless_space(aligned: AlignedField) -> SeamlessSpace:
     )
 
 
-def special_vertices(aligned: AlignedField) -> NDArray[np.bool_]:
-    """Vertices where isolines start: every irregular one, and seeds where there would be none.
-
-    Irregular are sectors of other than 4 quads inside or 2 along a feature, and vertices where
-    other than 0 or 2 feature edges meet. A feature curve without any, and a closed torus without
-    any, get one regular vertex as a seed. (n,) bool.
-    """
+def irregular_vertices(aligned: AlignedField) -> NDArray[np.bool_]:
+    """Vertices with a sector of other than 4 quads inside or 2 along a feature, and ends and
+    junctions of features; (n,) bool."""
     mesh = aligned.mesh
     regular = np.where(aligned.sector_is_feature, 2, 4)
-    special = np.zeros(mesh.n_vertices, dtype=bool)
-    special[aligned.sector_vertex[aligned.sector_quads != regular]] = True
-    edges = mesh.edges[np.unique(mesh.halfedge_edge[aligned.feature])]
-    valence = np.bincount(edges.ravel(), minlength=mesh.n_vertices)
-    special |= (valence != 0) & (valence != 2)
+    irregular = np.zeros(mesh.n_vertices, dtype=bool)
+    irregular[aligned.sector_vertex[aligned.sector_quads != regular]] = True
+    valence = np.bincount(_feature_edges(aligned).ravel(), minlength=mesh.n_vertices)
+    return irregular | ((valence != 0) & (valence != 2))
+
+
+def special_vertices(aligned: AlignedField) -> NDArray[np.bool_]:
+    """Vertices where isolines start: the irregular ones, and seeds where there would be none.
+
+    A feature curve without an irregular vertex gets one regular vertex as a seed, and so does a
+    closed surface without any. (n,) bool.
+    """
+    mesh = aligned.mesh
+    special = irregular_vertices(aligned)
+    edges = _feature_edges(aligned)
     if len(edges):
         graph = coo_matrix(
             (np.ones(len(edges), dtype=np.int8), (edges[:, 0], edges[:, 1])),
             shape=(mesh.n_vertices, mesh.n_vertices),
         )
         curve = connected_components(graph, directed=False)[1]
-        bare = np.setdiff1d(curve[edges[:, 0]], curve[special & (valence > 0)])
+        on_curve = np.unique(edges)
+        bare = np.setdiff1d(curve[on_curve], curve[on_curve[special[on_curve]]])
         for label in bare:
-            special[edges[curve[edges[:, 0]] == label][0, 0]] = True
+            special[on_curve[curve[on_curve] == label][0]] = True
     if not special.any():
         special[mesh.faces[0, 0]] = True
     return special
+
+
+def _feature_edges(aligned: AlignedField) -> Ints:
+    mesh = aligned.mesh
+    return mesh.edges[np.unique(mesh.halfedge_edge[aligned.feature])]
 
 
 def _comb(aligned: AlignedField) -> tuple[Ints, NDArray[np.bool_]]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from vhquad.errors import ParametrizationError
 from vhquad.field.align import AlignedField
 from vhquad.quad.motorcycle import Tracing, Track
+from vhquad.quad.seamless import irregular_vertices
 from vhquad.quad.seamless_map import SeamlessMap
 
 __all__ = ["Arc", "Patch", "TMesh", "build_tmesh"]
@@ -77,12 +78,18 @@ class TMesh:
         The special vertex at a node, -1 elsewhere.
     node_feature : (k,) int64
         Feature curve on which a node lies (any, if several meet), -1 elsewhere.
+    node_fixed : (k,) bool
+        Irregular vertices on features: corners, ends and junctions, which no polish may move.
+    curves : list of (p, 3) float64
+        Feature curves as polylines; a curve that closes up ends at its first point.
     arcs, patches : list
     """
 
     node_points: Floats
     node_vertex: NDArray[np.int64]
     node_feature: NDArray[np.int64]
+    node_fixed: NDArray[np.bool_]
+    curves: list[Floats]
     arcs: list[Arc]
     patches: list[Patch]
 
@@ -191,10 +198,14 @@ def build_tmesh(aligned: AlignedField, seamless: SeamlessMap, tracing: Tracing) 
             for v in (int(b.mesh.tail[h]), int(b.mesh.head[h])):
                 if v in b.node_of_vertex:
                     node_feature[b.node_of_vertex[v]] = number
+    node_vertex = np.array(b.vertex, dtype=np.int64)
+    irregular = irregular_vertices(aligned)
     return TMesh(
         node_points=np.array(b.points).reshape(-1, 3),
-        node_vertex=np.array(b.vertex, dtype=np.int64),
+        node_vertex=node_vertex,
         node_feature=node_feature,
+        node_fixed=(node_feature >= 0) & (node_vertex >= 0) & irregular[node_vertex],
+        curves=[b.mesh.vertices[np.append(b.mesh.tail[c], b.mesh.head[c[-1]])] for c in curves],
         arcs=b.arcs,
         patches=patches,
     )
@@ -216,10 +227,6 @@ def _exit_point(b: _Builder, track: Track) -> Floats:
     """Where a track leaves the face of its last step."""
     step = track.steps[-1]
     axis = step.direction % 2
-    travelled = sum(
-        abs(after.at - before.at) for before, after in ((step, step),)
-    )
-    del travelled
     end = _exit_coordinate(b, step.face, step.direction, step.level, step.at)
     u, v = (end, step.level) if axis == 0 else (step.level, end)
     return _surface_point(b, step.face, u, v)
