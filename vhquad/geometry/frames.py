@@ -87,8 +87,14 @@ class Frames:
     vertex_to_face: Complexes
 
 
-def build_frames(mesh: TriMesh) -> Frames:
+def build_frames(mesh: TriMesh, lengths: Floats | None = None) -> Frames:
     """Compute the frames of a mesh.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+    lengths : (m, 3) float64, optional
+        Length of halfedge k of each face, where the metric is another than that in space.
 
     Raises
     ------
@@ -101,7 +107,7 @@ def build_frames(mesh: TriMesh) -> Frames:
             f"{len(bad)} vertices join several fans of faces, the first is {bad[0]}; "
             "run repair first"
         )
-    lengths = mollified_lengths(mesh.edge_lengths)
+    lengths = mollified_lengths(mesh.edge_lengths if lengths is None else lengths)
     corner = corner_angles(lengths)
     preceding, angle_sum = _fan_angles(mesh, corner.reshape(-1))
     full = np.where(mesh.is_boundary_vertex, np.pi, 2.0 * np.pi)
