@@ -31,9 +31,7 @@ from numpy.typing import NDArray
 
 from vhquad.learn.subdivide import catmull_clark
 
-HEAD_PARTS = re.compile(
-    r"^(head|forehead|eyebrows|mouth|nose|chin|neck|(l|r)-(eye|ear|cheek))-"
-)
+HEAD_PARTS = re.compile(r"^(head|forehead|eyebrows|mouth|nose|chin|neck|(l|r)-(eye|ear|cheek))-")
 SIDES = (("l-", "r-"), ("Left", "Right"))
 MOST_SELF_INTERSECTIONS = 150  # triangles
 SCAN_IDENTITY = 1_000_000  # never reached by --count
@@ -131,7 +129,7 @@ def make_set(folder: Path, count: int, seed: int) -> None:
 
 
 def make_scan(path: Path, seed: int) -> None:
-    """One head that no training set of this script holds, as triangles without trace of its quads."""
+    """One head that no training set of this script holds, as triangles that hide its quads."""
     vertices, quads, _ = HeadMaker(seed).draw(SCAN_IDENTITY, skin_only=False)
     fine = catmull_clark(vertices, quads)
     triangles = np.concatenate([fine.quads[:, [0, 1, 2]], fine.quads[:, [0, 2, 3]]])

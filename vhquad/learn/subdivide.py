@@ -71,7 +71,7 @@ def catmull_clark(vertices: NDArray[np.float64], quads: NDArray[np.int64]) -> Su
     around_edge = to_edge @ face_point / count[:, None]
     edge_point = np.where(inner[:, None], 0.5 * (middle + around_edge), middle)
 
-    # An inner vertex of valence m: (mean of faces + 2 * mean of edge middles + (m - 3) * itself) / m.
+    # An inner vertex of valence m: (mean of faces + 2 mean of edge middles + (m - 3) itself) / m.
     to_vertex = coo_matrix((np.ones(4 * k), (tail, rows)), shape=(n, k)).tocsr()
     n_faces = np.asarray(to_vertex.sum(axis=1)).ravel()
     flat = ends.reshape(-1)
@@ -82,7 +82,7 @@ def catmull_clark(vertices: NDArray[np.float64], quads: NDArray[np.int64]) -> Su
     faces_mean = to_vertex @ face_point / np.maximum(n_faces, 1.0)[:, None]
     moved = (faces_mean + 2.0 * (by_edge @ middle) / used + (used - 3.0) * vertices) / used
 
-    # A vertex with two boundary edges: three quarters itself, an eighth each neighbour; others stay.
+    # A vertex with two boundary edges: 3/4 itself, 1/8 each neighbour; those with others stay.
     sharp = by_edge[:, ~inner]
     n_sharp = np.asarray(sharp.sum(axis=1)).ravel()
     on_curve = 0.5 * vertices + 0.25 * (sharp @ middle[~inner])

@@ -3,7 +3,7 @@
 Diffusing X by each of m times s_i and mapping the results by W_i is (Gao et al. 2024, eq. 6 and
 section 4.2)
 
-    Z = sum_i Phi exp(-Lambda s_i) (Phi^H M X) W_i  =  Phi [ sum_i exp(-Lambda s_i) (Phi^H M X) W_i ]
+    Z = sum_i Phi exp(-Lambda s_i) (Phi^H M X) W_i = Phi [sum_i exp(-Lambda s_i) (Phi^H M X) W_i]
 
 The right side maps k spectral rows instead of n vertices, so that more times cost next to nothing.
 """
@@ -33,9 +33,7 @@ def to_spectral(x: Tensor, mesh: NetworkInput) -> Tensor:
 def from_spectral(coefficients: Tensor, mesh: NetworkInput) -> Tensor:
     """Vertex values Phi C: (2, k, c) -> (2, n, c)."""
     re, im = coefficients[0], coefficients[1]
-    return torch.stack(
-        [mesh.basis @ torch.cat([re, -im]), mesh.basis @ torch.cat([im, re])]
-    )
+    return torch.stack([mesh.basis @ torch.cat([re, -im]), mesh.basis @ torch.cat([im, re])])
 
 
 class SpectralDiffusion(nn.Module):

@@ -1,7 +1,7 @@
 """Output heads: from the last features to the N-th power z of the direction, and to a length.
 
-- "paper": one vector u a vertex, z = u^N (Gao et al. 2024). For a cross, u has to jump by 90 degrees
-  somewhere around each singularity.
+- "paper": one vector u a vertex, z = u^N (Gao et al. 2024). For a cross, u has to jump by 90
+  degrees somewhere around each singularity.
 - "mixed": z = v_0^N / |v_0|^(N-1) + sum_c g_c v_c^N / |v_c|^(N-1), the gates g_c linear in the
   moduli of the last features and zero at first. Where one term has to jump another takes over.
 

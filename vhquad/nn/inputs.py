@@ -50,9 +50,27 @@ class NetworkInput:
         moved = {name: getattr(self, name).to(device=device, dtype=dtype) for name in names}
         return replace(self, **moved)
 
-    def with_features(self, features: Tensor) -> NetworkInput:
-        """The same operators with other features."""
-        return replace(self, features=features)
+    def low_precision(self) -> NetworkInput:
+        """The same with the basis in bfloat16, for use under autocast."""
+        basis, weighted = self.basis.bfloat16(), self.weighted_basis.bfloat16()
+        return replace(self, basis=basis, weighted_basis=weighted)
+
+    def mirror_image(self) -> NetworkInput:
+        """The mirror image of the mesh, seen in the conjugate of its frames.
+
+        Everything intrinsic is conjugate there, and real weights commute with that; only features
+        that were turned by a right angle turn the other way. Hence the network, given this,
+        answers the conjugate of what it would say of the mirror image: directly comparable, and
+        nothing has to be built for it. Features are taken to hold turned copies if their second
+        half is i times the first.
+        """
+        half = self.features.shape[2] // 2
+        first, second = self.features[..., :half], self.features[..., half:]
+        if first.shape != second.shape or not torch.allclose(
+            second, torch.stack([-first[1], first[0]]), rtol=1e-4, atol=1e-6
+        ):
+            return self
+        return replace(self, features=torch.cat([first, -second], dim=2))
 
 
 def network_input(
@@ -61,6 +79,7 @@ def network_input(
     eigenvectors: ArrayLike,
     features: ArrayLike,
     dtype: torch.dtype = torch.float32,
+    k: int | None = None,
 ) -> NetworkInput:
     """Make the network's input from a mesh's operators.
 
@@ -74,6 +93,11 @@ def network_input(
         Orthonormal with respect to ``mass``.
     features : (n, c) complex array_like
         Tangent vectors in the same frames, without units.
+    dtype : torch.dtype
+        Precision of the result.
+    k : int, optional
+        Eigenvectors that the network wants. A mesh with fewer vertices than that has fewer; as its
+        basis is complete, empty ones make up the number.
 
     Raises
     ------
@@ -92,6 +116,10 @@ def network_input(
     if not area > 0:
         raise ModelError("the mesh has no area")
     length = math.sqrt(area)
+    if k is not None and len(m) <= len(values) < k:
+        empty = k - len(values)
+        values = np.concatenate([values, np.zeros(empty)])
+        phi = np.concatenate([phi, np.zeros((len(m), empty), dtype=phi.dtype)], axis=1)
     basis = np.concatenate([phi.real, phi.imag], axis=1) * length
     share = m / area
     return NetworkInput(

@@ -8,6 +8,7 @@ one angle, and every layer here commutes with that (Gao et al. 2024, section 4.2
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -20,7 +21,7 @@ TINY = 1e-12  # below this modulus a complex number has no direction
 
 
 class VectorLinear(nn.Module):
-    """Z = Y W with a real weight ``(c_in, c_out)`` and no offset (an offset is no tangent vector)."""
+    """Z = Y W with a real weight ``(c_in, c_out)``; an offset would be no tangent vector."""
 
     def __init__(self, c_in: int, c_out: int, gain: float = 1.0) -> None:
         super().__init__()
@@ -39,7 +40,7 @@ class _MagnitudeReLUFunction(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, x: Tensor, bias: Tensor) -> Tensor:
         modulus = torch.sqrt(x[0].square().addcmul_(x[1], x[1])).clamp_(min=TINY)
-        ratio = bias / modulus
+        ratio = bias.to(x.dtype) / modulus
         scale = (1.0 - ratio).clamp_(min=0.0)
         ctx.save_for_backward(x, modulus, ratio)
         return x * scale
@@ -49,9 +50,9 @@ class _MagnitudeReLUFunction(torch.autograd.Function):
         (grad,) = grads
         x, modulus, ratio = ctx.saved_tensors
         active = ratio < 1.0
-        # radial = grad . z / |z|; out = (1 - b / |z|) z, so d out = (1 - b/|z|) dz + b/|z| radial part
+        # out = (1 - b / |z|) z, so d out = (1 - b / |z|) dz + b / |z| times dz's radial part
         radial = (grad[0] * x[0]).addcmul_(grad[1], x[1]).div_(modulus).mul_(active)
-        grad_bias = -radial.sum(dim=0)
+        grad_bias = -radial.sum(dim=0, dtype=torch.float32 if x.dtype.itemsize < 4 else x.dtype)
         scale = (1.0 - ratio).clamp_(min=0.0)
         grad_x = grad * scale
         grad_x.addcmul_(x, (radial * ratio).div_(modulus))
@@ -72,7 +73,7 @@ def magnitude_relu(x: Tensor, bias: Tensor) -> Tensor:
     (2, n, c) Tensor
         ``relu(|z| - b) z / |z|`` (Gao et al. 2024, section 4.2).
     """
-    return _MagnitudeReLUFunction.apply(x, bias)  # type: ignore[no-any-return,no-untyped-call]
+    return _MagnitudeReLUFunction.apply(x, bias)
 
 
 class MagnitudeReLU(nn.Module):
@@ -123,7 +124,7 @@ class VectorMLP(nn.Module):
     def __init__(self, sizes: list[int], dropout: float = 0.0, last_gain: float = 1.0) -> None:
         super().__init__()
         layers: list[nn.Module] = []
-        for place, (c_in, c_out) in enumerate(zip(sizes[:-1], sizes[1:], strict=True)):
+        for place, (c_in, c_out) in enumerate(itertools.pairwise(sizes)):
             last = place == len(sizes) - 2
             layers.append(VectorLinear(c_in, c_out, last_gain if last else 1.0))
             if not last:

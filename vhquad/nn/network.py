@@ -1,6 +1,6 @@
 """VectorHeatNet: the network of Gao et al. 2024, figure 3, on one screen.
 
-    features --in MLP--> X --[ diffusion at m times, vector MLP, + X ] x N--> out MLP --head--> z, size
+features --in MLP--> X --[ diffusion at m times, vector MLP, + X ] x N--> out MLP --head--> z, size
 """
 
 from __future__ import annotations
@@ -33,6 +33,10 @@ class FieldOutput:
 
     z: Tensor
     size: Tensor
+
+    def float(self) -> FieldOutput:
+        """In single precision."""
+        return FieldOutput(self.z.float(), self.size.float())
 
 
 class DiffusionBlock(nn.Module):

@@ -43,6 +43,8 @@ class ModelSettings:
         Terms of the mixed head beside the first.
     features : str
         Name of the input features (``vhquad.geometry.features``).
+    turned : bool
+        Whether copies of the features turned by a right angle are among them.
     """
 
     in_channels: int = 30
@@ -57,6 +59,7 @@ class ModelSettings:
     head: Head = "mixed"
     head_terms: int = 15
     features: str = "hks"
+    turned: bool = True
 
     def __post_init__(self) -> None:
         for name in ("in_channels", "channels", "blocks", "times", "k", "hidden_layers"):

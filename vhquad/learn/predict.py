@@ -1,0 +1,152 @@
+"""From a mesh to the cross field that a trained network sees in it.
+
+Each connected component is predicted by itself. The answers for the mesh and for its mirror image
+are averaged, which makes a symmetric shape's field symmetric. Components above some size are
+predicted on a decimated proxy and the field is carried back (``resolution="full"`` prevents that).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from vhquad.errors import ConfigError, ModelError
+from vhquad.field.cross import CrossField
+from vhquad.geometry.operators import OperatorSettings, load_or_build
+from vhquad.learn.device import choose_device
+from vhquad.learn.proxy import carry_back, make_proxy
+from vhquad.mesh.triangle import TriMesh
+from vhquad.nn.checkpoint import Model, load_model
+from vhquad.nn.inputs import NetworkInput, network_input, unstack
+from vhquad.nn.network import VectorHeatNet
+from vhquad.nn.settings import ModelSettings
+
+__all__ = ["PROXY_ABOVE", "Prediction", "Resolution", "predict_field", "predict_input"]
+
+PROXY_ABOVE = 15_000  # vertices of a component
+PROXY_VERTICES = 10_000
+
+Resolution = Literal["auto", "full"]
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Raw answer at the vertices of one mesh.
+
+    Attributes
+    ----------
+    z : (n,) complex128
+        N-th power of the direction, not normalised.
+    size : (n,) float64
+        Length in units of the mesh.
+    """
+
+    z: NDArray[np.complex128]
+    size: NDArray[np.float64]
+
+
+def predict_field(
+    mesh: TriMesh,
+    model: Model | Path | str | None = None,
+    resolution: Resolution = "auto",
+    device: str = "auto",
+    cache_dir: Path | str | None = None,
+    cache: bool = True,
+    on_component: Callable[[int, int], None] | None = None,
+) -> CrossField:
+    """Predict a cross field with quad sizes.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+        Manifold, without unused vertices (see :mod:`vhquad.mesh.repair`).
+    model : Model or path, optional
+        The shipped model if not given.
+    resolution : "auto" or "full"
+        "auto" predicts components above :data:`PROXY_ABOVE` vertices on a proxy.
+    device : str
+        "auto" takes CUDA where there is one.
+    cache_dir, cache
+        Where operators are kept, and whether; see :func:`vhquad.geometry.operators.load_or_build`.
+    on_component : callable, optional
+        Called with (components done, components) after each.
+
+    Returns
+    -------
+    CrossField
+        On the vertices. z is 0, and the size too, on components without area.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be read or does not predict crosses.
+    MeshError
+        If the mesh is not manifold.
+    ConfigError
+        If an option is unknown or the device does not exist.
+    """
+    if resolution not in ("auto", "full"):
+        raise ConfigError(f'resolution must be "auto" or "full", not {resolution!r}')
+    chosen = model if isinstance(model, Model) else load_model(model)
+    if chosen.settings.order != 4:
+        raise ModelError(
+            f"the model predicts fields of order {chosen.settings.order}; crosses need order 4"
+        )
+    target = choose_device(device)
+    network = chosen.network.to(target)
+    z = np.zeros(mesh.n_vertices, dtype=np.complex128)
+    size = np.zeros(mesh.n_vertices)
+
+    def on_surface(surface: TriMesh) -> CrossField:
+        settings = operator_settings(chosen.settings)
+        operators = load_or_build(surface, settings, cache_dir, cache)
+        given = network_input(
+            operators.mass,
+            operators.eigenvalues,
+            operators.eigenvectors,
+            operators.features,
+            k=chosen.settings.k,
+        )
+        answer = predict_input(network, given.to(target))
+        return CrossField("vertices", answer.z, answer.size)
+
+    count = mesh.n_components
+    for label in range(count):  # components are few
+        if count == 1:
+            part, used = mesh, np.arange(mesh.n_vertices)
+        else:
+            part, used = mesh.submesh(mesh.face_component == label)
+        if part.area > 1e-24 * mesh.diagonal**2:
+            proxy = None
+            if resolution == "auto" and part.n_vertices > PROXY_ABOVE:
+                proxy = make_proxy(part, PROXY_VERTICES)
+            if proxy is None:
+                field = on_surface(part)
+            else:
+                field = carry_back(proxy, on_surface(proxy), part)
+            z[used] = field.z
+            if field.size is not None:
+                size[used] = field.size
+        if on_component is not None:
+            on_component(label + 1, count)
+    return CrossField("vertices", z, size)
+
+
+def predict_input(network: VectorHeatNet, mesh: NetworkInput) -> Prediction:
+    """The network's answer for a prepared mesh, averaged with that for its mirror image."""
+    network.eval()
+    with torch.inference_mode():
+        own, other = network(mesh), network(mesh.mirror_image())
+    size = torch.sqrt(own.size * other.size).cpu().double().numpy() * mesh.length
+    return Prediction(0.5 * (unstack(own.z) + unstack(other.z)), np.asarray(size))
+
+
+def operator_settings(settings: ModelSettings) -> OperatorSettings:
+    """The operators that a model takes."""
+    return OperatorSettings(k=settings.k, features=settings.features, turned=settings.turned)

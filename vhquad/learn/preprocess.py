@@ -1,0 +1,362 @@
+"""From a folder of meshes to a dataset: in parallel, resumable, naming what it cannot use.
+
+What each file gives:
+
+- a mesh of quads only: samples with ground truth, see ``targets.py``, several a shape;
+- a triangle mesh with a field file of the same stem beside it: one sample with that truth;
+- any other triangle mesh: one sample without truth.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import multiprocessing
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vhquad.errors import ConfigError, DatasetError, VhquadError
+from vhquad.field.cross import CrossField
+from vhquad.geometry.operators import OperatorSettings, build_operators
+from vhquad.learn.augment import crop_height, deform, mirror
+from vhquad.learn.dataset import Dataset, SampleEntry, Split, write_index, write_sample
+from vhquad.learn.sources import Part, read_source
+from vhquad.learn.targets import leak, make_target
+from vhquad.mesh.triangle import TriMesh
+
+__all__ = ["PreprocessSettings", "preprocess"]
+
+MESH_SUFFIXES = (".obj", ".ply", ".off", ".stl", ".glb")
+REVISION = 1  # raise when samples made by older code are no longer good
+
+
+@dataclass(frozen=True)
+class PreprocessSettings:
+    """How samples are made.
+
+    Attributes
+    ----------
+    triangulations : int
+        Samples a quad mesh. The first is the whole shape as it is; the others may be varied.
+    vertices : (int, int)
+        Range of the vertex count of a sample made from quads, drawn log-uniformly.
+    crops : float
+        Share of the further samples that are cropped.
+    deform : float
+        Share of the further samples that are deformed and perhaps mirrored.
+    val, test : float
+        Share of the shapes put aside; ``split.json`` in the folder ({"shape": "test", ...}) goes
+        first. A shape is named by its path in the folder without suffix, "-" between the folders,
+        up to a double underscore.
+    features : str
+        Input features of the network.
+    turned : bool
+        With copies of the features turned by a right angle.
+    k : int
+        Eigenvectors.
+    seed : int
+    """
+
+    triangulations: int = 2
+    vertices: tuple[int, int] = (2000, 4000)
+    crops: float = 0.75
+    deform: float = 0.0
+    val: float = 0.1
+    test: float = 0.0
+    features: str = "hks"
+    turned: bool = True
+    k: int = 128
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.triangulations < 1:
+            raise ConfigError(f"--triangulations must be at least 1, not {self.triangulations}")
+        low, high = self.vertices
+        if not 100 <= low <= high:
+            raise ConfigError(f"--vertices must be a range from 100 up, not {low} to {high}")
+        for name in ("crops", "deform", "val", "test"):
+            value = getattr(self, name)
+            if not 0.0 <= value <= 1.0:
+                raise ConfigError(f"--{name} must lie between 0 and 1, not {value}")
+        if self.k < 1:
+            raise ConfigError(f"--k must be at least 1, not {self.k}")
+
+
+@dataclass(frozen=True)
+class _Job:
+    folder: Path
+    source: Path
+    out: Path
+    settings: PreprocessSettings
+    chosen: dict[str, str]
+
+    @property
+    def name(self) -> str:
+        return self.source.relative_to(self.folder).as_posix()
+
+    @property
+    def stem(self) -> str:
+        return "-".join(self.source.relative_to(self.folder).with_suffix("").parts)
+
+    @property
+    def shape(self) -> str:
+        return self.stem.split("__")[0]
+
+
+@dataclass(frozen=True)
+class _Done:
+    source: str
+    entries: tuple[SampleEntry, ...]
+    skipped: tuple[tuple[str, str], ...]
+    in_channels: int | None
+
+
+def preprocess(
+    folder: Path | str,
+    out: Path | str,
+    settings: PreprocessSettings | None = None,
+    workers: int = 2,
+    on_source: Callable[[str, int, int], None] | None = None,
+) -> Dataset:
+    """Prepare every mesh below a folder. Samples that are there already and still fit are kept.
+
+    Parameters
+    ----------
+    folder : path
+        Holds meshes (OBJ, PLY, OFF, STL, GLB), in subfolders too, and perhaps ``split.json``.
+    out : path
+        The dataset's folder; see :mod:`vhquad.learn.dataset` for its layout.
+    settings : PreprocessSettings, optional
+    workers : int
+        Processes.
+    on_source : callable, optional
+        Called with (source, how many are done, how many there are) after each file.
+
+    Returns
+    -------
+    Dataset
+
+    Raises
+    ------
+    DatasetError
+        If there is no mesh, or none could be used.
+    """
+    settings = PreprocessSettings() if settings is None else settings
+    folder, out = Path(folder), Path(out)
+    jobs = _jobs(folder, out, settings)
+    (out / "samples").mkdir(parents=True, exist_ok=True)
+    finished: dict[str, _Done] = {}
+    for done in _run(jobs, workers):
+        finished[done.source] = done
+        if on_source is not None:
+            on_source(done.source, len(finished), len(jobs))
+    ordered = [finished[job.name] for job in jobs]
+    entries = tuple(entry for done in ordered for entry in done.entries)
+    skipped = tuple(item for done in ordered for item in done.skipped)
+    if not entries:
+        first = f"; the first: {skipped[0][0]}: {skipped[0][1]}" if skipped else ""
+        raise DatasetError(f"none of the {len(jobs)} meshes in {folder} could be used{first}")
+    channels = next(done.in_channels for done in ordered if done.in_channels is not None)
+    dataset = Dataset(
+        folder=out,
+        features=settings.features,
+        turned=settings.turned,
+        k=settings.k,
+        in_channels=channels,
+        order=4,
+        samples=entries,
+        skipped=skipped,
+    )
+    write_index(dataset)
+    return dataset
+
+
+def _jobs(folder: Path, out: Path, settings: PreprocessSettings) -> list[_Job]:
+    if not folder.is_dir():
+        raise DatasetError(f"{folder} is no folder")
+    chosen: dict[str, str] = {}
+    if (folder / "split.json").exists():
+        try:
+            chosen = json.loads((folder / "split.json").read_text(encoding="utf-8"))
+        except ValueError as error:
+            raise DatasetError(f"{folder / 'split.json'} is damaged: {error}") from None
+        if not isinstance(chosen, dict) or set(chosen.values()) - {"train", "val", "test"}:
+            raise DatasetError(
+                f'{folder / "split.json"} must map shapes to "train", "val" or "test"'
+            )
+    sources = sorted(
+        path
+        for path in folder.rglob("*")
+        if path.suffix.lower() in MESH_SUFFIXES and out not in path.parents
+    )
+    if not sources:
+        raise DatasetError(f"{folder} holds no mesh ({', '.join(MESH_SUFFIXES)})")
+    return [_Job(folder, source, out, settings, chosen) for source in sources]
+
+
+def _run(jobs: list[_Job], workers: int) -> Iterator[_Done]:
+    seen: dict[str, str] = {}
+    unique = []
+    for job in jobs:
+        if job.stem in seen:
+            reason = f"another file of that name is used: {seen[job.stem]}"
+            yield _Done(job.name, (), ((job.name, reason),), None)
+        else:
+            seen[job.stem] = job.name
+            unique.append(job)
+    if workers <= 1 or len(unique) == 1:
+        yield from map(_prepare, unique)
+        return
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=_one_thread) as pool:
+        futures = [pool.submit(_prepare, job) for job in unique]
+        try:
+            for future in as_completed(futures):
+                yield future.result()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _one_thread() -> None:
+    import torch
+
+    torch.set_num_threads(1)
+
+
+def _prepare(job: _Job) -> _Done:
+    """All samples of one file."""
+    entries: list[SampleEntry] = []
+    skipped: list[tuple[str, str]] = []
+    channels = None
+    try:
+        parts = read_source(job.source)
+    except (VhquadError, OSError) as error:
+        return _Done(job.name, (), ((job.name, str(error)),), None)
+    digest = hashlib.sha256(b"".join(path.read_bytes() for path in parts[0].files)).hexdigest()
+    for part in parts:
+        count = job.settings.triangulations if part.quads is not None else 1
+        for index in range(count):
+            name = f"{job.stem}{part.suffix}.t{index}"
+            try:
+                entry, channels = _sample(job, part, name, index, digest)
+                entries.append(entry)
+            except VhquadError as error:
+                skipped.append((f"{job.name} ({name})", str(error)))
+            except Exception as error:  # third-party code on strange input: name it and go on
+                skipped.append((f"{job.name} ({name})", f"{type(error).__name__}: {error}"))
+    return _Done(job.name, tuple(entries), tuple(skipped), channels)
+
+
+def _sample(job: _Job, part: Part, name: str, index: int, digest: str) -> tuple[SampleEntry, int]:
+    settings = job.settings
+    relevant = {n: v for n, v in asdict(settings).items() if n not in ("val", "test")}
+    if part.quads is not None:
+        relevant.pop("triangulations")
+    else:
+        relevant = asdict(_operator_settings(settings))
+    text = json.dumps([REVISION, digest, name, relevant], sort_keys=True)
+    key = hashlib.sha256(text.encode()).hexdigest()[:32]
+    split = _split(job)
+    kept = _kept(job.out / "samples" / f"{name}.npz", key)
+    if kept is not None:
+        return replace(kept[0], split=split), kept[1]
+    made = _make(part, index, np.random.default_rng(int(key, 16)), settings)
+    arrays = _operator_arrays(made.mesh, settings)
+    if made.field is not None:
+        arrays |= _truth_arrays(made.field)
+    entry = SampleEntry(
+        name=name,
+        shape=job.shape,
+        source=job.name,
+        split=split,
+        truth=made.field is not None,
+        vertices=made.mesh.n_vertices,
+        leak=None if made.field is None else round(leak(made.mesh, made.field), 6),
+        variant=made.variant,
+        key=key,
+    )
+    arrays["entry"] = np.array(json.dumps(asdict(entry)))
+    write_sample(job.out, name, arrays)
+    return entry, arrays["features"].shape[1]
+
+
+@dataclass(frozen=True, eq=False)
+class _Made:
+    mesh: TriMesh
+    field: CrossField | None
+    variant: str
+
+
+def _make(part: Part, index: int, rng: np.random.Generator, settings: PreprocessSettings) -> _Made:
+    """The triangle mesh and the truth of one sample; quads are varied from the second sample on."""
+    if part.mesh is not None:
+        return _Made(part.mesh, part.field, "plain" if part.field is None else "pair")
+    assert part.vertices is not None
+    assert part.quads is not None
+    low, high = settings.vertices
+    n_vertices = round(float(np.exp(rng.uniform(np.log(low), np.log(high)))))
+    vertices, quads, variant = part.vertices, part.quads, []
+    if index > 0 and rng.random() < settings.deform:
+        variant.append("deformed")
+        vertices = deform(vertices, rng)
+        if rng.random() < 0.5:
+            vertices, quads = mirror(vertices, quads)
+    crop = None
+    if index > 0 and rng.random() < settings.crops:
+        variant.append("cropped")
+        crop = partial(crop_height, rng=rng)
+    target = make_target(vertices, quads, n_vertices, rng, crop)
+    return _Made(target.mesh, target.field, "+".join(variant) or "whole")
+
+
+def _operator_settings(settings: PreprocessSettings) -> OperatorSettings:
+    return OperatorSettings(k=settings.k, features=settings.features, turned=settings.turned)
+
+
+def _operator_arrays(mesh: TriMesh, settings: PreprocessSettings) -> dict[str, NDArray[Any]]:
+    operators = build_operators(mesh, _operator_settings(settings))
+    return {
+        "vertices": mesh.vertices,
+        "faces": mesh.faces,
+        "mass": operators.mass,
+        "eigenvalues": operators.eigenvalues,
+        "eigenvectors": operators.eigenvectors.astype(np.complex64),
+        "features": operators.features.astype(np.complex64),
+    }
+
+
+def _truth_arrays(field: CrossField) -> dict[str, NDArray[Any]]:
+    coherence = np.abs(field.z) if field.confidence is None else field.confidence
+    size = np.zeros(len(field)) if field.size is None else field.size
+    return {"z": field.z, "size": size, "coherence": coherence}
+
+
+def _kept(path: Path, key: str) -> tuple[SampleEntry, int] | None:
+    """The entry and the channels of a sample made earlier, if it is whole and has the same key."""
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            raw = json.loads(str(archive["entry"]))
+            if raw["key"] != key:
+                return None
+            return SampleEntry(**raw), int(archive["features"].shape[1])
+    except Exception:  # missing or damaged in any way: make it again
+        return None
+
+
+def _split(job: _Job) -> Split:
+    """By ``split.json``, else by the hash of the shape's name."""
+    if job.shape in job.chosen:
+        return job.chosen[job.shape]  # type: ignore[return-value]
+    digest = hashlib.sha256(f"{job.settings.seed}/{job.shape}".encode()).digest()
+    place = int.from_bytes(digest[:8], "big") / 2.0**64
+    if place < job.settings.val:
+        return "val"
+    return "test" if place < job.settings.val + job.settings.test else "train"
