@@ -26,7 +26,14 @@ from vhquad.geometry.laplacian import cotan_laplacian, gradient_operator, lumped
 from vhquad.geometry.spectral import Spectrum, smallest_eigenpairs
 from vhquad.mesh.triangle import TriMesh
 
-__all__ = ["FEATURES", "HKS_TIMES", "ShapeContext", "compute_features", "heat_kernel_signature"]
+__all__ = [
+    "FEATURES",
+    "HKS_TIMES",
+    "ShapeContext",
+    "compute_features",
+    "heat_kernel_signature",
+    "hks_gradients",
+]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -94,18 +101,35 @@ def heat_kernel_signature(spectrum: Spectrum, times: Floats) -> Floats:
     return np.asarray(np.abs(spectrum.eigenvectors) ** 2 @ decay)
 
 
+def hks_gradients(spectrum: Spectrum, shape: ShapeContext) -> Complexes:
+    """Gradients of the signature at ``HKS_TIMES``, mean length 1; (n, 15).
+
+    The constant eigenfunctions have no gradient and are left out: what remains of a late signature
+    may be 1e-9 of them and would drown in their rounding.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        Of the scalar Laplacian.
+    shape : ShapeContext
+    """
+    mass = lumped_mass(shape.tri)
+    label = np.zeros(len(mass), dtype=np.int64)
+    label[shape.mesh.faces.reshape(-1)] = np.repeat(shape.mesh.face_component, 3)
+    parts = int(label.max()) + 1
+    values, vectors = spectrum.eigenvalues[parts:], spectrum.eigenvectors[:, parts:]
+    signature = np.zeros((len(mass), len(HKS_TIMES)))
+    for component in range(parts):  # few
+        rows = label == component
+        times = HKS_TIMES * mass[rows].sum() / (4.0 * np.pi)
+        signature[rows] = heat_kernel_signature(Spectrum(values, vectors[rows]), times)
+    return _gradients(signature, signature.mean(axis=0), shape)
+
+
 def _hks(shape: ShapeContext) -> Complexes:
     mass = lumped_mass(shape.tri)
     spectrum = smallest_eigenpairs(cotan_laplacian(shape.tri), mass, shape.k)
-    label = np.zeros(len(mass), dtype=np.int64)
-    label[shape.mesh.faces.reshape(-1)] = np.repeat(shape.mesh.face_component, 3)
-    signature = np.zeros((len(mass), len(HKS_TIMES)))
-    for component in range(label.max() + 1):  # few
-        rows = label == component
-        area = mass[rows].sum()
-        part = Spectrum(spectrum.eigenvalues, spectrum.eigenvectors[rows])
-        signature[rows] = heat_kernel_signature(part, HKS_TIMES * area / (4.0 * np.pi))
-    return _gradients(signature, signature.mean(axis=0), shape)
+    return hks_gradients(spectrum, shape)
 
 
 def _gaussian(shape: ShapeContext) -> Complexes:

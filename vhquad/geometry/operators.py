@@ -31,7 +31,7 @@ __all__ = [
     "load_or_build",
 ]
 
-OPERATORS_VERSION = 1
+OPERATORS_VERSION = 2
 """Raised whenever the same mesh and settings give other operators; old cache entries then rest."""
 
 _ARRAYS = ("mass", "eigenvalues", "eigenvectors", "features")
@@ -194,7 +194,7 @@ def _key(mesh: TriMesh, settings: OperatorSettings) -> str:
 def _read(path: Path, mesh: TriMesh, settings: OperatorSettings) -> Operators | None:
     """The entry at a path, or None if it is absent, damaged, or of the wrong shape."""
     try:
-        with np.load(path, allow_pickle=False) as data:
+        with open(path, "rb") as handle, np.load(handle, allow_pickle=False) as data:
             mass, values, vectors, features = (data[name] for name in _ARRAYS)
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None
