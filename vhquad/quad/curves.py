@@ -79,13 +79,13 @@ class CurveConstraints:
         """No curve at all, for a mesh of n vertices."""
         return cls([], [], np.full(n_vertices, -1))
 
-    def restrict(self, vertices: Ints) -> CurveConstraints:
-        """The same curves for a part of the mesh: vertex i of the part is ``vertices[i]``."""
-        part = object.__new__(CurveConstraints)
+    def bind(self, curve: Ints) -> CurveConstraints:
+        """The same curves for other vertices: vertex i lies on curve ``curve[i]``, -1 for none."""
+        other = object.__new__(CurveConstraints)
         for name in ("points", "start", "closed", "arc"):
-            object.__setattr__(part, name, getattr(self, name))
-        object.__setattr__(part, "curve", self.curve[vertices])
-        return part
+            object.__setattr__(other, name, getattr(self, name))
+        object.__setattr__(other, "curve", curve)
+        return other
 
     def wrap(self, vertices: Ints, arc: Floats) -> Floats:
         """Bring arc lengths back to the curves of the vertices: modulo if closed, else clamped."""

@@ -147,7 +147,7 @@ def _repair_patches(problem: Problem, state: State, poor: Bools) -> State:
     part = make_problem(
         local.reshape(-1, 4),
         problem.surface,
-        problem.curves.restrict(used),
+        problem.curves.bind(problem.curves.curve[used]),
         (held | problem.fixed)[used],
         problem.size[inside],
     )
