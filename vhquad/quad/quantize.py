@@ -11,10 +11,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import highspy
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import Bounds, LinearConstraint, milp
-from scipy.sparse import coo_matrix, csr_matrix, hstack, identity
+from scipy.sparse import coo_matrix, csr_matrix, hstack
+from scipy.sparse.csgraph import connected_components
 
 from vhquad.errors import ParametrizationError
 from vhquad.quad.layout import Layout, build_layout
@@ -29,7 +30,8 @@ Ints = NDArray[np.int64]
 COUNT_TOLERANCE = 0.03  # stop adjusting the scale once the count is this near
 MOST_SCALES = 6
 MOST_ROUNDS = 40
-MIP_SECONDS = 10.0
+MOST_DIVES = 60
+MIP_SECONDS = 20.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,13 +95,24 @@ def _next_scale(tried: list[tuple[float, float]]) -> float:
 
 
 class _Program:
-    """The part of the program that does not depend on the scale."""
+    """The linear program of a T-mesh, kept warm between solves.
+
+    An arc's length is ``base + up_1 + up_2 - down_1 - down_2`` with ``base`` the wanted length
+    rounded down; the first steps are bounded by one quad, and convexity fills them in order.
+    """
 
     def __init__(self, tmesh: TMesh) -> None:
         self.tmesh = tmesh
+        self.lengths = tmesh.lengths
+        self.size = len(tmesh.arcs)
         rows, cols, values = [], [], []
         row = 0
+        across = np.zeros(self.size)  # mean extent, across each arc, of its two patches
         for patch in tmesh.patches:
+            extent = [sum(self.lengths[h >> 1] for h in side) for side in patch.sides]
+            for i in range(4):
+                for h in patch.sides[i]:
+                    across[h >> 1] += 0.5 * extent[(i + 1) % 4]
             for i in (0, 1):
                 for side, sign in ((patch.sides[i], 1), (patch.sides[i + 2], -1)):
                     for h in side:
@@ -107,70 +120,192 @@ class _Program:
                         cols.append(h >> 1)
                         values.append(sign)
                 row += 1
-        size = len(tmesh.arcs)
-        self.sides = coo_matrix((values, (rows, cols)), shape=(row, size)).tocsr()
-        self.lengths = tmesh.lengths
-        across = np.zeros(size)  # mean extent, across each arc, of its two patches
-        for patch in tmesh.patches:
-            extent = [sum(self.lengths[h >> 1] for h in side) for side in patch.sides]
-            for i in range(4):
-                for h in patch.sides[i]:
-                    across[h >> 1] += 0.5 * extent[(i + 1) % 4]
         self.across = across
+        shape = (row, self.size)
+        self.sides = coo_matrix((values, (rows, cols)), shape=shape, dtype=np.float64).tocsr()
+        self.sides.sum_duplicates()
+        self.known: list[Condition] = []
+        self.solver = highspy.Highs()
+        self.solver.silent()
+        self.wanted = self.lengths
+        self.base = np.floor(self.wanted)
+        self._load()
 
-    def solve(self, wanted: Floats, conditions: list[Condition]) -> Ints:
-        """Best integer lengths under the conditions."""
-        size = len(wanted)
+    def _load(self) -> None:
+        full = _steps(self.sides)
+        lp = highspy.HighsLp()
+        lp.num_col_, lp.num_row_ = full.shape[1], full.shape[0]
+        lp.col_cost_ = np.zeros(full.shape[1])
+        lp.col_lower_ = np.zeros(full.shape[1])
+        lp.col_upper_ = np.full(full.shape[1], highspy.kHighsInf)
+        lp.row_lower_ = np.zeros(full.shape[0])
+        lp.row_upper_ = np.zeros(full.shape[0])
+        lp.a_matrix_.format_ = highspy.MatrixFormat.kRowwise
+        lp.a_matrix_.start_ = full.indptr
+        lp.a_matrix_.index_ = full.indices
+        lp.a_matrix_.value_ = full.data
+        self.solver.passModel(lp)
+
+    def rescale(self, wanted: Floats) -> None:
+        """Set the wanted arc lengths."""
+        self.wanted = wanted
+        base = np.floor(wanted)
+        self.base = base
+        rest = wanted - base
         scale = wanted.sum() / self.lengths.sum()
         weight = (self.across * scale + 0.1) / np.maximum(wanted, 0.5)
-        base = np.floor(wanted)
-        rest = wanted - base
-        # Cost of the first and of each further step up and down from the floor.
-        up = [(1 - rest) ** 2 - rest**2, (2 - rest) ** 2 - (1 - rest) ** 2]
-        down = [(1 + rest) ** 2 - rest**2, (2 + rest) ** 2 - (1 + rest) ** 2]
-        cost = np.concatenate([np.zeros(size), *(weight * step for step in (*up, *down))])
-        one = identity(size, format="csr")
-        nothing = csr_matrix((self.sides.shape[0], 4 * size))
-        constraints = [
-            LinearConstraint(hstack([self.sides, nothing], format="csr"), 0, 0),
-            LinearConstraint(hstack([one, -one, -one, one, one], format="csr"), base, base),
+        # Cost of the first and of each further step up and down from the base.
+        steps = [
+            (1 - rest) ** 2 - rest**2,
+            (2 - rest) ** 2 - (1 - rest) ** 2,
+            (1 + rest) ** 2 - rest**2,
+            (2 + rest) ** 2 - (1 + rest) ** 2,
         ]
-        if conditions:
-            rows = np.repeat(np.arange(len(conditions)), [len(c.form) for c in conditions])
-            cols = [k for c in conditions for k, _ in c.form]
-            values = [v for c in conditions for _, v in c.form]
-            form = coo_matrix((values, (rows, cols)), shape=(len(conditions), 5 * size)).tocsr()
-            bounds = np.array([c.bound for c in conditions], dtype=np.float64)
-            constraints.append(LinearConstraint(form, bounds, np.inf))
-        step = np.concatenate([np.ones(size), np.full(size, np.inf)])
-        upper = np.concatenate([np.full(size, np.inf), step, step])
-        whole = np.concatenate([np.ones(size), np.zeros(4 * size)])
-        relaxed = milp(cost, bounds=Bounds(0, upper), constraints=constraints)
-        if relaxed.x is None:
-            raise ParametrizationError("the arc lengths of the T-mesh contradict each other")
-        real = relaxed.x[:size]
-        if np.abs(real - np.round(real)).max() < 1e-6:
-            return np.round(real).astype(np.int64)
-        for slack in (0, 1, 3):
-            low = np.concatenate([np.maximum(np.floor(real + 1e-6) - slack, 0), np.zeros(4 * size)])
-            high = np.concatenate([np.ceil(real - 1e-6) + slack, upper[size:]])
-            near = milp(
-                cost,
-                integrality=whole,
-                bounds=Bounds(low, high),
-                constraints=constraints,
-                options={"mip_rel_gap": 0.01, "time_limit": MIP_SECONDS},
+        cost = np.concatenate([weight * step for step in steps])
+        columns = np.arange(len(cost), dtype=np.int32)
+        self.solver.changeColsCost(len(cost), columns, cost)
+        self._bound(np.zeros(self.size), np.full(self.size, np.inf))
+        right = -(self.sides @ base)
+        for row, value in enumerate(right.tolist()):
+            self.solver.changeRowBounds(row, value, value)
+        for number, condition in enumerate(self.known):
+            self.solver.changeRowBounds(
+                self.sides.shape[0] + number, self._bound_of(condition), highspy.kHighsInf
             )
-            if near.x is not None:
-                return np.round(near.x[:size]).astype(np.int64)
-        raise ParametrizationError("no integer arc lengths were found for the T-mesh")
+
+    def _bound_of(self, condition: Condition) -> float:
+        return condition.bound - float(sum(c * self.base[k] for k, c in condition.form))
+
+    def add(self, conditions: list[Condition]) -> None:
+        """Add conditions for this and all later scales."""
+        for condition in conditions:
+            arcs = np.array([k for k, _ in condition.form])
+            factors = np.array([c for _, c in condition.form], dtype=np.float64)
+            index = np.concatenate([arcs + part * self.size for part in range(4)])
+            value = np.concatenate([factors, factors, -factors, -factors])
+            self.solver.addRow(
+                self._bound_of(condition),
+                highspy.kHighsInf,
+                len(index),
+                index.astype(np.int32),
+                value,
+            )
+            self.known.append(condition)
+
+    def _bound(self, low: Floats, high: Floats, arcs: Ints | None = None) -> None:
+        """Bounds on the lengths of some arcs (all by default)."""
+        arcs = np.arange(self.size) if arcs is None else arcs
+        base = self.base[arcs]
+        above, below = np.maximum(high - base, 0), np.maximum(base - low, 0)
+        least_up, least_down = np.maximum(low - base, 0), np.maximum(base - high, 0)
+        lower = [
+            np.minimum(least_up, 1),
+            np.maximum(least_up - 1, 0),
+            np.minimum(least_down, 1),
+            np.maximum(least_down - 1, 0),
+        ]
+        upper = [
+            np.minimum(above, 1),
+            np.maximum(above - 1, 0),
+            np.minimum(below, 1),
+            np.maximum(below - 1, 0),
+        ]
+        columns = np.concatenate([arcs + part * self.size for part in range(4)]).astype(np.int32)
+        self.solver.changeColsBounds(
+            len(columns), columns, np.concatenate(lower), np.concatenate(upper)
+        )
+
+    def _run(self) -> Floats | None:
+        self.solver.run()
+        if self.solver.getModelStatus() not in (
+            highspy.HighsModelStatus.kOptimal,
+            highspy.HighsModelStatus.kTimeLimit,
+        ):
+            return None
+        x = np.array(self.solver.getSolution().col_value).reshape(4, self.size)
+        return np.asarray(self.base + x[0] + x[1] - x[2] - x[3])
+
+    def solve(self) -> Ints:
+        """Best integer lengths found under the conditions.
+
+        Lengths that come out fractional hang together in chains; one of each chain is rounded and
+        the program solved again, until all are whole.
+        """
+        low, high = np.zeros(self.size), np.full(self.size, np.inf)
+        real = self._run()
+        if real is None:
+            raise ParametrizationError("the arc lengths of the T-mesh contradict each other")
+        for _ in range(MOST_DIVES):
+            off = np.abs(real - np.round(real)) > 1e-6
+            if not off.any():
+                break
+            pick = self._one_a_chain(off)
+            for batch in (pick, pick[:1]):
+                # Towards the wanted length; a half can go either way.
+                value = np.where(
+                    self.wanted[batch] < real[batch], np.floor(real[batch]), np.ceil(real[batch])
+                )
+                self._bound(value, value, batch)
+                following = self._run()
+                if following is not None:
+                    real = following
+                    break
+                self._bound(low[batch], high[batch], batch)
+            else:
+                other = np.floor(real[batch]) + np.ceil(real[batch]) - value
+                self._bound(other, other, batch)
+                following = self._run()
+                if following is None:
+                    self._bound(low, high)
+                    return self._search()
+                real = following
+        else:
+            self._bound(low, high)
+            return self._search()
+        self._bound(low, high)
+        return np.round(real).astype(np.int64)
+
+    def _one_a_chain(self, off: NDArray[np.bool_]) -> Ints:
+        """The weightiest fractional arc of each chain of fractional arcs."""
+        row = np.repeat(np.arange(self.sides.shape[0]), np.diff(self.sides.indptr))
+        col = self.sides.indices
+        keep = off[col]
+        graph = coo_matrix(
+            (np.ones(int(keep.sum())), (row[keep], self.sides.shape[0] + col[keep])),
+            shape=(self.sides.shape[0] + self.size,) * 2,
+        )
+        label = connected_components(graph, directed=False)[1][self.sides.shape[0] :]
+        arcs = np.flatnonzero(off)
+        order = arcs[np.lexsort((arcs, -self.across[arcs]))]
+        return order[np.unique(label[order], return_index=True)[1]]
+
+    def _search(self) -> Ints:
+        """The integer program itself: slow, and seldom needed."""
+        columns = np.arange(4 * self.size, dtype=np.int32)
+        kinds = np.full(4 * self.size, highspy.HighsVarType.kInteger)
+        self.solver.changeColsIntegrality(len(columns), columns, kinds)
+        self.solver.setOptionValue("time_limit", self.solver.getRunTime() + MIP_SECONDS)
+        self.solver.setOptionValue("mip_rel_gap", 0.02)
+        real = self._run()
+        self.solver.setOptionValue("time_limit", highspy.kHighsInf)
+        kinds = np.full(4 * self.size, highspy.HighsVarType.kContinuous)
+        self.solver.changeColsIntegrality(len(columns), columns, kinds)
+        if real is None or np.abs(real - np.round(real)).max() > 1e-5:
+            raise ParametrizationError("no integer arc lengths were found for the T-mesh")
+        return np.round(real).astype(np.int64)
+
+
+def _steps(rows: csr_matrix) -> csr_matrix:
+    """Rows over arcs as rows over their steps: two up, two down."""
+    return hstack([rows, rows, -rows, -rows], format="csr")
 
 
 def _separated(program: _Program, scale: float, conditions: dict[Condition, None]) -> Quantisation:
     """Solve, look for what fell together, add conditions, and solve again until nothing does."""
     wanted = program.lengths * scale
+    program.rescale(wanted)
     for number in range(1, MOST_ROUNDS + 1):
-        lengths = program.solve(wanted, list(conditions))
+        lengths = program.solve()
         layout = build_layout(program.tmesh, lengths)
         found = separation_conditions(layout, wanted) or loop_conditions(layout, wanted)
         new = [c for c in found if c not in conditions]
@@ -179,4 +314,5 @@ def _separated(program: _Program, scale: float, conditions: dict[Condition, None
         if not new:
             break
         conditions.update(dict.fromkeys(new))
+        program.add(new)
     raise ParametrizationError("parts of the surface cannot be kept apart at this density")

@@ -80,6 +80,11 @@ class _Borders:
         for number in touched:
             self._add(tmesh, number, wanted)
 
+    def value(self, form: Form) -> int:
+        """A form at the present lengths."""
+        lengths = self.layout.lengths
+        return sum(c * (1 if k < 0 else int(lengths[k])) for k, c in form.items())
+
     def _add(self, tmesh: TMesh, number: int, wanted: set[int]) -> None:
         layout = self.layout
         x: Form = {}
@@ -213,6 +218,8 @@ def _part(
                 continue
             dx = _combine(dict(other.x), dict(place.x), -1)
             dy = _combine(dict(other.y), dict(place.y), -1)
+            if borders.value(dx) or borders.value(dy):
+                continue  # they fell together on another way
             tx, ty = _rotated(dx, dy, turn)
             nx, ny = _combine(x, tx, 1), _combine(y, ty, 1)
             target = group_of.get(other.point)
