@@ -392,6 +392,13 @@ def two_cubes_on_an_edge() -> Soup:
     return _voxel_arrays(solid, 1.0)
 
 
+def doubled_edge() -> Soup:
+    """Faces that stay together about both ends of a crowded edge: it needs another vertex."""
+    v = [[2, 2, 2], [0, 1, 1], [1, 1, 0], [2, 1, 1], [2, 0, 1], [0, 0, 2]]
+    f = [[0, 3, 1], [1, 0, 2], [1, 2, 0], [3, 2, 0], [5, 4, 1], [4, 0, 1], [4, 1, 3], [5, 4, 0]]
+    return np.array(v, dtype=np.float64), np.array([*f, [1, 5, 3], [4, 3, 0]])
+
+
 def mixed_winding() -> Soup:
     """A sphere with every third face reversed."""
     mesh = icosphere(1)
@@ -445,6 +452,7 @@ SOUPS: dict[str, Callable[[], Soup]] = {
     "with_needle": with_needle,
     "three_fins": three_fins,
     "bowtie": bowtie,
+    "doubled_edge": doubled_edge,
     "two_cubes_on_an_edge": two_cubes_on_an_edge,
     "mixed_winding": mixed_winding,
     "inside_out": inside_out,
@@ -515,3 +523,8 @@ def _voxel_arrays(solid: NDArray[np.bool_], size: float) -> Soup:
 
 def _voxel_surface(solid: NDArray[np.bool_], size: float) -> TriMesh:
     return TriMesh(*_voxel_arrays(solid, size))
+
+
+def voxels(solid: object) -> TriMesh:
+    """Surface of unit voxels where `solid` is true; non-manifold where voxels meet at an edge."""
+    return _voxel_surface(np.asarray(solid, dtype=bool), 1.0)

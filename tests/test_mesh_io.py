@@ -154,7 +154,8 @@ def ply(kind: str, mixed: bool) -> bytes:
     """Two quads, or a quad and a triangle, with properties and elements that do not matter."""
     head = (
         f"ply\nformat {kind} 1.0\ncomment by hand\nelement material 1\n"
-        "property list uchar int ids\nproperty float shine\nelement vertex 6\nproperty float x\nproperty float y\n"
+        "property list uchar int ids\nproperty float shine\n"
+        "element vertex 6\nproperty float x\nproperty float y\n"
         "property uchar red\nproperty double z\nelement face 2\nproperty uchar flag\n"
         "property list uchar int vertex_indices\nproperty list uchar float texcoord\nend_header\n"
     ).encode()

@@ -202,7 +202,7 @@ class QuadMesh:
     @property
     def euler_characteristic(self) -> int:
         """V - E + F over the vertices that some quad uses."""
-        return int(np.unique(self.quads).size) - len(self.edges) + self.n_quads
+        return int((self.valence > 0).sum()) - len(self.edges) + self.n_quads
 
     @property
     def genus(self) -> int:

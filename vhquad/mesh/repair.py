@@ -67,8 +67,7 @@ def repair(vertices: ArrayLike, faces: ArrayLike) -> RepairResult:
         infinite, coordinates are out of all bounds, or no face has any area.
     """
     v, f = _checked(vertices, faces)
-    used = np.unique(f)
-    scale = float(np.abs(v[used]).max())
+    scale = float(np.abs(v[f]).max())
     unit = np.where(np.isfinite(v), v, 0.0) / scale if scale > 0 else np.zeros_like(v)
     before = _Stage(v, unit, f, np.arange(len(v)), np.arange(len(f)), RepairReport())
     for _ in range(_PASSES):
@@ -217,12 +216,13 @@ def _assemble(stage: _Stage, weld: Ints, gluing: Gluing, report: RepairReport) -
     inward = inward_faces(TriMesh(unit, faces), turned)
     faces[inward] = faces[inward][:, [0, 2, 1]]
 
-    pairs = len(np.unique(vertex * np.int64(len(stage.points)) + own))
+    joint = np.sort(vertex * np.int64(len(stage.points)) + own)
+    pairs = 1 + int((joint[1:] != joint[:-1]).sum())
     report = replace(
         report,
         turned_faces=int((turned ^ inward).sum()),
         welded_vertices=pairs - len(lowest),
-        split_vertices=pairs - len(np.unique(own)),
+        split_vertices=pairs - int((np.bincount(own) > 0).sum()),
     )
     return _Stage(
         points,
@@ -259,8 +259,8 @@ def _checked(vertices: ArrayLike, faces: ArrayLike) -> tuple[Floats, Ints]:
             f"{len(bad)} faces use vertices that are NaN or infinite, the first is vertex"
             f" {corners[wrong[corners]][0]} of face {bad[0]}; delete them or export again"
         )
-    size = float(np.ptp(v[np.unique(f)], axis=0).max())
-    if not (np.abs(v[np.unique(f)]).max() < 1e100 and (size == 0 or size > 1e-100)):
+    size = float(np.ptp(v[f].reshape(-1, 3), axis=0).max())
+    if not (np.abs(v[f]).max() < 1e100 and (size == 0 or size > 1e-100)):
         raise MeshError("coordinates are beyond 1e100 or all within 1e-100; rescale the mesh")
     return v, f
 
@@ -268,4 +268,4 @@ def _checked(vertices: ArrayLike, faces: ArrayLike) -> tuple[Floats, Ints]:
 def _lost(v: Floats, faces: Ints, face_source: Ints) -> int:
     """Components of the input, joined by place, of which no face is left."""
     part = _face_parts(position_classes(np.where(np.isfinite(v), v, 0.0))[faces], len(v))
-    return int(part.max()) + 1 - len(np.unique(part[face_source]))
+    return int(part.max()) + 1 - int((np.bincount(part[face_source]) > 0).sum())

@@ -103,7 +103,12 @@ class TriMesh:
     @property
     def euler_characteristic(self) -> int:
         """V - E + F over the vertices that some face uses."""
-        return int(np.unique(self.faces).size) - self.n_edges + self.n_faces
+        return int(self.is_used_vertex.sum()) - self.n_edges + self.n_faces
+
+    @cached_property
+    def is_used_vertex(self) -> Bools:
+        """Whether some face uses a vertex; (n,)."""
+        return np.bincount(self.faces.reshape(-1), minlength=self.n_vertices) > 0
 
     # ---- halfedges ------------------------------------------------------------------------
 
@@ -263,7 +268,7 @@ class TriMesh:
     @cached_property
     def diagonal(self) -> float:
         """Length of the diagonal of the bounding box of the used vertices."""
-        used = self.vertices[np.unique(self.faces)]
+        used = self.vertices[self.is_used_vertex]
         return float(np.linalg.norm(used.max(axis=0) - used.min(axis=0)))
 
     @cached_property
