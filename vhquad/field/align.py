@@ -12,10 +12,15 @@ from dataclasses import field as default
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
 
-from vhquad.errors import ConfigError, FieldError
+from vhquad.errors import ConfigError, FieldError, MeshError
+from vhquad.field.boundary import BoundaryTangents, boundary_tangents
 from vhquad.field.cancel import cancel_pairs, cure_low_sectors, low_sectors
 from vhquad.field.cross import CrossField
+from vhquad.field.dual import face_angles
+from vhquad.field.features import crease_halfedges, hopeless_creases
 from vhquad.field.matching import MatchedField, match_field
 from vhquad.field.refine import Refinement, no_refinement, split_edges
 from vhquad.field.separate import separate_features, separate_singularities
@@ -28,6 +33,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
+SHORTEST_CREASE = 2.0  # edge lengths; of what is left where part of a crease was dropped
+TINY = 1e-9
 MOST_SPLITS = 12  # rounds of splitting where vertices are too few; one or two happen
 
 
@@ -68,6 +75,10 @@ class AlignReport:
         Quad edge length that distances were measured by.
     splits : int
         Vertices added.
+    corners : int
+        Boundary vertices where the boundary turns.
+    creases, creases_dropped : int
+        Crease edges kept, and left out because no quad fits beside them.
     pairs_cancelled : int
         Pairs of opposite singularities taken out.
     indices_moved : int
@@ -78,6 +89,9 @@ class AlignReport:
 
     edge_length: float
     splits: int = 0
+    corners: int = 0
+    creases: int = 0
+    creases_dropped: int = 0
     pairs_cancelled: int = 0
     indices_moved: int = 0
     singularities: dict[int, int] = default(default_factory=dict)
@@ -154,7 +168,9 @@ def align_field(
     Raises
     ------
     FieldError
-        If the field does not fit the mesh.
+        If the field does not fit the mesh, or the mesh is too coarse for any legal field.
+    MeshError
+        If a face has no area, or a crease is no edge.
     """
     settings = settings or AlignSettings()
     if field.domain != "faces" or len(field) != mesh.n_faces:
@@ -162,17 +178,31 @@ def align_field(
             f"align_field needs a cross for each of {mesh.n_faces} faces, "
             f"not {len(field)} on {field.domain}; see vhquad.field.transport"
         )
+    flat = np.flatnonzero(mesh.face_areas <= 0.0)
+    if flat.size:
+        raise MeshError(f"{flat.size} faces have no area, the first is {flat[0]}; run repair first")
     length = _edge_length(mesh, field, settings)
-    feature = mesh.twin < 0
-    first = separate_features(mesh, feature)
-    matched = _solve(first, field, first.carry(feature, False), length, settings)
-    kept = np.zeros(matched.n_sectors, dtype=bool)
-    matched, cancelled = cancel_pairs(matched, settings.cancel * length, kept)
+    feature = (mesh.twin < 0) | crease_halfedges(mesh, creases)
+    n_creases = _count_creases(mesh, feature)
+    while True:
+        first = separate_features(mesh, feature)
+        matched, boundary = _solve(first, feature, field, length, settings)
+        blunt = hopeless_creases(matched, SHORTEST_CREASE * length)
+        if not blunt.any():
+            break
+        feature[first.source[blunt]] = False
+
+    kept = boundary.corner | (matched.feature & (matched.mesh.twin >= 0))
+    n_kept = _count_creases(mesh, feature)
+    matched, cancelled = cancel_pairs(matched, settings.cancel * length, matched.touched(kept))
     matched, room, moved = _cure(matched, settings.cancel * length)
     matched, last = separate_singularities(matched)
     report = AlignReport(
         edge_length=length,
         splits=matched.mesh.n_vertices - mesh.n_vertices,
+        corners=int(boundary.corner.sum()),
+        creases=n_kept,
+        creases_dropped=n_creases - n_kept,
         pairs_cancelled=cancelled,
         indices_moved=moved,
         singularities=_singularities(matched),
@@ -188,20 +218,48 @@ def _edge_length(mesh: TriMesh, field: CrossField, settings: AlignSettings) -> f
     return float(np.sqrt(mesh.area / 2000.0))
 
 
+def _count_creases(mesh: TriMesh, feature: Bools) -> int:
+    return int((feature & (mesh.twin >= 0)).sum()) // 2
+
+
 def _solve(
     refinement: Refinement,
-    field: CrossField,
     feature: Bools,
+    field: CrossField,
     length: float,
     settings: AlignSettings,
-) -> MatchedField:
-    """The field polished on the refined mesh and matched."""
+) -> tuple[MatchedField, BoundaryTangents]:
+    """The field polished and matched on the refined mesh; ``feature`` is of the input mesh."""
     mesh = refinement.mesh
+    feature = refinement.carry(feature, False)
+    boundary = boundary_tangents(mesh, length)
+    on = np.flatnonzero(feature)
     target = field.z[refinement.parent] * np.exp(-4j * refinement.turn)
-    trust = 1.0 if field.confidence is None else field.confidence[refinement.parent]
-    weight = trust * (target != 0) * mesh.face_areas / max(settings.smoothing * length, 1e-12) ** 2
-    z = polish(mesh, target, weight)
-    return match_field(mesh, np.angle(z) / 4.0, feature, np.zeros(len(feature)))
+    target[on // 3] = np.exp(4j * (face_angles(mesh) + boundary.lean)[on])
+    fixed = np.zeros(mesh.n_faces, dtype=bool)
+    fixed[on // 3] = True
+    weight = mesh.face_areas / max(settings.smoothing * length, TINY * mesh.diagonal) ** 2
+    if field.confidence is not None:
+        weight = weight * field.confidence[refinement.parent]
+    weight = weight * (target != 0) * _distance_trust(mesh, on, length)
+    z = polish(mesh, target, weight, fixed)
+    return match_field(mesh, np.angle(z) / 4.0, feature, boundary.lean), boundary
+
+
+def _distance_trust(mesh: TriMesh, on: Ints, length: float) -> Floats:
+    """How far the given field counts: 0 at features, 1 from about an edge length on; (m,)."""
+    if on.size == 0:
+        return np.ones(mesh.n_faces)
+    h = np.arange(3 * mesh.n_faces)
+    inner = h[(mesh.twin < 0) | (h < mesh.twin)]
+    shape = (mesh.n_vertices, mesh.n_vertices)
+    lengths = mesh.edge_lengths.reshape(-1)[inner]
+    graph = csr_matrix((lengths, (mesh.tail[inner], mesh.head[inner])), shape)
+    start = np.unique(np.concatenate([mesh.tail[on], mesh.head[on]]))
+    limit = 4.0 * length
+    far = dijkstra(graph, directed=False, indices=start, limit=limit, min_only=True)
+    far = np.minimum(far, limit)[mesh.faces].mean(axis=1)
+    return np.asarray(1.0 - np.exp(-((far / length) ** 2)))
 
 
 def _cure(matched: MatchedField, distance: float) -> tuple[MatchedField, Refinement, int]:

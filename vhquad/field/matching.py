@@ -40,7 +40,7 @@ from vhquad.field.dual import face_angles
 from vhquad.field.refine import Refinement
 from vhquad.mesh.triangle import TriMesh, next_halfedge
 
-__all__ = ["MatchedField", "match_field"]
+__all__ = ["MatchedField", "label_sectors", "match_field"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -102,12 +102,7 @@ class MatchedField:
 
     @cached_property
     def _sectors(self) -> tuple[int, Ints]:
-        h = np.flatnonzero(~self.feature)
-        across = next_halfedge(self.mesh.twin[h])
-        size = len(self.feature)
-        links = coo_matrix((np.ones(len(h), dtype=np.int8), (h, across)), shape=(size, size))
-        count, label = connected_components(links, directed=False)
-        return int(count), label.astype(np.int64)
+        return label_sectors(self.mesh, self.feature)
 
     @property
     def n_sectors(self) -> int:
@@ -129,10 +124,15 @@ class MatchedField:
     @cached_property
     def sector_is_feature(self) -> Bools:
         """Whether feature halfedges delimit a sector, else it is a full fan; (s,)."""
+        return self.touched(self.feature, ends=True)
+
+    def touched(self, halfedges: Bools, ends: bool = False) -> Bools:
+        """Sectors at the tails (and the heads, if ``ends``) of some halfedges; (s,) bool."""
         flag = np.zeros(self.n_sectors, dtype=bool)
-        h = np.flatnonzero(self.feature)
+        h = np.flatnonzero(halfedges)
         flag[self.corner_sector[h]] = True
-        flag[self.corner_sector[next_halfedge(h)]] = True
+        if ends:
+            flag[self.corner_sector[next_halfedge(h)]] = True
         return flag
 
     @cached_property
@@ -169,6 +169,16 @@ class MatchedField:
             lean=step.carry(self.lean, 0.0),
             jump=step.carry(self.jump, 0.0),
         )
+
+
+def label_sectors(mesh: TriMesh, feature: Bools) -> tuple[int, Ints]:
+    """Number of sectors, and the sector of each corner; (3m,)."""
+    h = np.flatnonzero(~feature)
+    across = next_halfedge(mesh.twin[h])
+    shape = (len(feature), len(feature))
+    links = coo_matrix((np.ones(len(h), dtype=np.int8), (h, across)), shape=shape)
+    count, label = connected_components(links, directed=False)
+    return int(count), label.astype(np.int64)
 
 
 def match_field(mesh: TriMesh, angle: Floats, feature: Bools, lean: Floats) -> MatchedField:

@@ -87,10 +87,14 @@ def unit(z: Complexes) -> Complexes:
 
 
 def factorized(matrix: Any) -> Callable[[NDArray[Any]], NDArray[Any]]:
-    """Solver of a symmetric (or Hermitian) positive definite sparse matrix, by SuperLU."""
+    """Solver of a Hermitian positive definite sparse matrix on faces, by SuperLU.
+
+    COLAMD, since minimum degree on A + A^T takes 15 s on some dual graphs of 32k faces, where every
+    node has three neighbours; COLAMD takes 0.2 s for twice the fill.
+    """
     lu = splu(
         csc_matrix(matrix),
-        permc_spec="MMD_AT_PLUS_A",
+        permc_spec="COLAMD",
         diag_pivot_thresh=0.0,
         options={"SymmetricMode": True},
     )
