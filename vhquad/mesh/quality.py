@@ -1,0 +1,187 @@
+"""Is a quad mesh valid, and how good is it: the figures that every report shows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vhquad.mesh.closest import ClosestPoints
+from vhquad.mesh.distance import Distance, surface_distance
+from vhquad.mesh.quad import QuadMesh
+from vhquad.mesh.triangle import TriMesh
+
+__all__ = ["QualityReport", "check_quads", "flipped_quads", "scaled_jacobians"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_NO_AREA = 1e-12
+"""A quad below this share of the square of its longest side has no area."""
+
+
+@dataclass(frozen=True)
+class QualityReport:
+    """Validity, regularity, shape and closeness of a quad mesh; plain numbers only."""
+
+    vertices: int
+    quads: int
+    non_quads: int
+    """Faces that are not quads; 0 by construction."""
+    components: int
+    euler_characteristic: int
+    boundary_loops: int
+    nonmanifold_edges: int
+    """Edges with more than two quads."""
+    nonmanifold_vertices: int
+    """Vertices where several fans of quads meet."""
+    misoriented_edges: int
+    """Edges whose two quads are wound against each other."""
+    degenerate_quads: int
+    """Quads that name a vertex twice or have no area."""
+    unused_vertices: int
+    irregular_interior: Mapping[int, int]
+    """How many interior vertices have each valence other than 4."""
+    irregular_boundary: Mapping[int, int]
+    """How many boundary vertices have each valence other than 3."""
+    doublets: int
+    """Interior vertices of valence 2."""
+    scaled_jacobian_min: float
+    """Of all corners; 1 is a square corner, 0 and less is folded. NaN without quads."""
+    scaled_jacobian_mean: float
+    """Mean over the quads of their worst corner."""
+    folded_quads: int
+    """Quads with a corner whose scaled Jacobian is 0 or less."""
+    edge_length_min: float
+    edge_length_mean: float
+    edge_length_max: float
+    flipped_quads: int | None = None
+    """Quads that face against the surface beneath them; None without a surface."""
+    distance: Distance | None = None
+    """From and to the surface, in % of its diagonal; None without a surface."""
+
+    @property
+    def is_valid(self) -> bool:
+        """Whether it is a manifold, consistently wound mesh of true quads, with none unused."""
+        return self.quads > 0 and not (
+            self.non_quads
+            or self.nonmanifold_edges
+            or self.nonmanifold_vertices
+            or self.misoriented_edges
+            or self.degenerate_quads
+            or self.unused_vertices
+        )
+
+    @property
+    def irregular_vertices(self) -> int:
+        """Interior vertices of valence other than 4."""
+        return sum(self.irregular_interior.values())
+
+    def to_dict(self) -> dict[str, Any]:
+        """All figures by name, for JSON."""
+        return asdict(self)
+
+
+def check_quads(mesh: QuadMesh, against: TriMesh | None = None) -> QualityReport:
+    """Judge a quad mesh.
+
+    Parameters
+    ----------
+    mesh : QuadMesh
+        Any; the worse it is, the more the report has to say.
+    against : TriMesh, optional
+        The surface it stands for: adds distances and quads facing the wrong way.
+
+    Returns
+    -------
+    QualityReport
+    """
+    jacobian = scaled_jacobians(mesh)
+    some = mesh.n_quads > 0
+    length = mesh.edge_lengths if some else np.full(1, np.nan)
+    distance, flipped = None, None
+    if against is not None and some:
+        distance = surface_distance(TriMesh(mesh.vertices, mesh.triangles()), against)
+        flipped = len(flipped_quads(mesh, against))
+    flat = np.zeros(mesh.n_quads, dtype=bool)
+    flat[mesh.degenerate_quads] = True
+    return QualityReport(
+        vertices=mesh.n_vertices,
+        quads=mesh.n_quads,
+        non_quads=0,
+        components=mesh.n_components,
+        euler_characteristic=mesh.euler_characteristic,
+        boundary_loops=mesh.n_boundary_loops,
+        nonmanifold_edges=len(mesh.nonmanifold_edges),
+        nonmanifold_vertices=len(mesh.nonmanifold_vertices),
+        misoriented_edges=len(mesh.misoriented_edges),
+        degenerate_quads=int((flat | _without_area(mesh)).sum()),
+        unused_vertices=int((mesh.valence == 0).sum()),
+        irregular_interior=mesh.irregular_interior,
+        irregular_boundary=mesh.irregular_boundary,
+        doublets=len(mesh.doublets),
+        scaled_jacobian_min=float(jacobian.min()) if some else float("nan"),
+        scaled_jacobian_mean=float(jacobian.min(axis=1).mean()) if some else float("nan"),
+        folded_quads=int((jacobian <= 0).any(axis=1).sum()),
+        edge_length_min=float(length.min()),
+        edge_length_mean=float(length.mean()),
+        edge_length_max=float(length.max()),
+        flipped_quads=flipped,
+        distance=distance,
+    )
+
+
+def scaled_jacobians(mesh: QuadMesh) -> Floats:
+    """Sine of each corner's angle, signed against the quad's own mean normal.
+
+    Parameters
+    ----------
+    mesh : QuadMesh
+
+    Returns
+    -------
+    (k, 4) float64
+        n . (a x b) / (|a| |b|) at each corner, where a and b are the sides out of it to the next
+        and to the previous corner and n is the unit area vector of the quad; 1 at all corners of a
+        rectangle, negative where the quad is folded or dented, 0 where a side has no length.
+    """
+    p = mesh.vertices[mesh.quads]
+    a, b = np.roll(p, -1, axis=1) - p, np.roll(p, 1, axis=1) - p
+    normal = _area_vectors(mesh)
+    part = np.einsum("qki,qi->qk", np.cross(a, b), normal)
+    whole = np.linalg.norm(a, axis=2) * np.linalg.norm(b, axis=2)
+    whole = whole * np.linalg.norm(normal, axis=1)[:, None]
+    return np.divide(part, whole, out=np.zeros_like(part), where=whole > 0)
+
+
+def flipped_quads(mesh: QuadMesh, surface: TriMesh) -> Ints:
+    """Quads that face against the surface beneath them.
+
+    The normals of the surface at the points closest to the quad's middle and to four points half
+    way to its corners decide together, which spares quads across a crease.
+
+    Returns
+    -------
+    (j,) int64
+    """
+    p = mesh.vertices[mesh.quads]
+    middle = p.mean(axis=1)
+    points = np.concatenate([middle[:, None], 0.5 * (p + middle[:, None])], axis=1)
+    face = ClosestPoints(surface).query(points.reshape(-1, 3)).face.reshape(-1, 5)
+    beneath = surface.face_normals[face].sum(axis=1)
+    return np.flatnonzero(np.einsum("qi,qi->q", beneath, _area_vectors(mesh)) < 0)
+
+
+def _area_vectors(mesh: QuadMesh) -> Floats:
+    """Normal of each quad, as long as its area; (k, 3)."""
+    p = mesh.vertices[mesh.quads]
+    return np.asarray(0.5 * np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1]))
+
+
+def _without_area(mesh: QuadMesh) -> NDArray[np.bool_]:
+    p = mesh.vertices[mesh.quads]
+    longest = np.linalg.norm(np.roll(p, -1, axis=1) - p, axis=2).max(axis=1, initial=0.0)
+    return np.asarray(np.linalg.norm(_area_vectors(mesh), axis=1) <= _NO_AREA * longest**2)
