@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ComponentReport",
+    "FieldReport",
     "MeshCounts",
     "RemeshReport",
     "from_plain",
@@ -83,7 +84,8 @@ class ComponentReport:
     reason : str
         Why a fallback was used; empty if none was.
     singularities : dict of int to int
-        Index in quarters (1 is +1/4, a vertex of valence 3) to how many the field has.
+        Interior singular vertices of the field, by the number of quads around them (3 where the
+        index is +1/4, 5 where it is -1/4).
     cancelled : int
         Pairs of opposite singularities too close for a quad between them, removed beforehand.
     seconds : dict of str to float
@@ -171,6 +173,38 @@ class RemeshReport:
         known = {f.name for f in fields(cls)}
         report: RemeshReport = from_plain(cls, {k: v for k, v in values.items() if k in known})
         return report
+
+
+@dataclass(frozen=True)
+class FieldReport:
+    """What a predicted cross field looks like.
+
+    Attributes
+    ----------
+    input : MeshCounts
+        The repaired mesh.
+    singularities : dict of int to int
+        Interior singular vertices, by the number of quads around them.
+    index_sum : float
+        Sum of their indices: on a closed mesh the Euler characteristic; on an open one the rest
+        is taken by the boundary.
+    size : dict of str to float, or None
+        "least", "median" and "largest" edge length of the quads wanted, in units of the mesh.
+    quads : int or None
+        Quads that these sizes amount to.
+    repair : tuple of str
+    seconds : dict of str to float
+    versions : dict of str to str
+    """
+
+    input: MeshCounts
+    singularities: Mapping[int, int]
+    index_sum: float
+    size: Mapping[str, float] | None = None
+    quads: int | None = None
+    repair: tuple[str, ...] = ()
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    versions: Mapping[str, str] = field(default_factory=lambda: versions())
 
 
 # ---- JSON -----------------------------------------------------------------------------------

@@ -1,0 +1,267 @@
+"""Whole tasks in one call, for scripts and for the command line: load, predict, remesh."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vhquad.errors import ConfigError, FieldError
+from vhquad.field.cross import CrossField
+from vhquad.field.io import read_field
+from vhquad.field.singular import find_singularities
+from vhquad.mesh.load import LoadedMesh, load
+from vhquad.mesh.repair import repair
+from vhquad.mesh.triangle import TriMesh
+from vhquad.quad.pipeline import RemeshResult, RemeshSettings, remesh_mesh
+from vhquad.report import FieldReport, MeshCounts
+
+if TYPE_CHECKING:
+    from vhquad.nn.checkpoint import Model
+
+__all__ = [
+    "LoadedMesh",
+    "Method",
+    "clock",
+    "describe_field",
+    "load",
+    "own_field",
+    "predict",
+    "remesh",
+    "remesh_with",
+]
+
+Method = Literal["learned", "curvature"]
+Progress = Callable[[str, float], None]
+
+CURVATURE_LENGTH = 0.05  # detail below this share of the area's square root is smoothed away
+
+
+def predict(
+    mesh: TriMesh,
+    model: Model | Path | str | None = None,
+    *,
+    method: Method = "learned",
+    resolution: Literal["auto", "full"] = "auto",
+    device: str = "auto",
+    cache: bool = True,
+    progress: Progress | None = None,
+) -> CrossField:
+    """A cross at every vertex of a mesh, with the size of the quads wanted there.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+        Sound, as :func:`load` and :func:`vhquad.mesh.repair.repair` make it.
+    model : Model or path, optional
+        A trained model; the shipped one if not given.
+    method : "learned" or "curvature"
+        The network, or the smoothest field along the directions of curvature, which needs no
+        model and has no sizes.
+    resolution : "auto" or "full"
+        "auto" predicts large components on a decimated copy and carries the field back.
+    device : str
+        For the network: "auto", "cpu", "cuda" ...
+    cache : bool
+        Keep the operators of the mesh, and use those kept.
+    progress : callable, optional
+        Called with (what runs, share done).
+
+    Returns
+    -------
+    CrossField
+        On vertices.
+
+    Raises
+    ------
+    VhquadError
+        If the mesh, the model or an option cannot be used.
+    """
+    if method not in ("learned", "curvature"):
+        raise ConfigError(f'method must be "learned" or "curvature", not {method!r}')
+    if method == "curvature":
+        if model is not None:
+            raise ConfigError("a model was given, but the method curvature uses none")
+        from vhquad.learn.baselines import curvature_aligned
+
+        return curvature_aligned(mesh, (CURVATURE_LENGTH,))[0]
+    from vhquad.learn.predict import predict_field
+
+    def on_component(done: int, count: int) -> None:
+        if progress is not None:
+            progress("predicting the field", done / count)
+
+    return predict_field(mesh, model, resolution, device, cache=cache, on_component=on_component)
+
+
+def remesh(
+    vertices: ArrayLike,
+    faces: ArrayLike,
+    *,
+    target_quads: int | None = None,
+    edge_length: float | None = None,
+    method: Method = "learned",
+    field: CrossField | str | PathLike[str] | None = None,
+    model: Model | Path | str | None = None,
+    crease: float | None = 40.0,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> RemeshResult:
+    """Turn a triangle mesh into an all-quad mesh.
+
+    Parameters
+    ----------
+    vertices : (n, 3) array_like
+    faces : (m, 3) array_like of integers
+        Any triangles; what is not sound is repaired first, and the report says so.
+    target_quads : int, optional
+        Quads wanted. Default: as many as the predicted sizes make.
+    edge_length : float, optional
+        Edge length of the quads, in units of the mesh, in place of `target_quads`.
+    method : "learned" or "curvature"
+        Where the cross field comes from, see :func:`predict`.
+    field : CrossField or path, optional
+        A cross field of one's own in place of `method`, on the vertices or faces of the mesh.
+    model : Model or path, optional
+        A trained model; the shipped one if not given.
+    crease : float or None
+        Edges whose faces turn by more than so many degrees are kept as edges; None keeps none.
+    seed : int
+        The same seed gives the same quads.
+    progress : callable, optional
+        Called with (what runs, share done).
+
+    Returns
+    -------
+    RemeshResult
+        The quads, the report and the map.
+
+    Raises
+    ------
+    VhquadError
+        If the mesh, the field, the model or an option cannot be used.
+    """
+    settings = RemeshSettings(
+        target_quads=target_quads, edge_length=edge_length, crease=crease, seed=seed
+    )
+    seconds: dict[str, float] = {}
+    with clock(seconds, "repair"):
+        repaired = repair(vertices, faces)
+    with clock(seconds, "field"):
+        cross = own_field(repaired.mesh, field) if field is not None else None
+        if cross is None:
+            cross = predict(repaired.mesh, model, method=method, progress=progress)
+    return remesh_with(
+        repaired.mesh,
+        cross,
+        settings,
+        repair_lines=repaired.report.lines(),
+        seconds=seconds,
+        progress=progress,
+    )
+
+
+def remesh_with(
+    mesh: TriMesh,
+    field: CrossField,
+    settings: RemeshSettings | None = None,
+    *,
+    creases: ArrayLike | None = None,
+    repair_lines: Sequence[str] = (),
+    seconds: Mapping[str, float] | None = None,
+    progress: Progress | None = None,
+) -> RemeshResult:
+    """Remesh a sound mesh by a field, with what happened before in the report.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+    field : CrossField
+        On its vertices or faces.
+    settings : RemeshSettings, optional
+    creases : (k, 2) array_like, optional
+        Vertex pairs of edges to keep, beside those that the settings find.
+    repair_lines : sequence of str
+        What was repaired.
+    seconds : dict, optional
+        Wall time of the steps before.
+    progress : callable, optional
+
+    Returns
+    -------
+    RemeshResult
+    """
+    result = remesh_mesh(mesh, field, settings, creases=creases, progress=progress)
+    report = replace(
+        result.report,
+        repair=(*repair_lines, *result.report.repair),
+        seconds={**(seconds or {}), **result.report.seconds},
+    )
+    return replace(result, report=report)
+
+
+def own_field(mesh: TriMesh, field: CrossField | str | PathLike[str]) -> CrossField:
+    """A field as it is given, or read from a file (the format by its suffix).
+
+    Raises
+    ------
+    FieldError
+        If the file cannot be read or the field is not one of this mesh.
+    """
+    if not isinstance(field, CrossField):
+        return read_field(field, mesh)
+    expected = mesh.n_faces if field.domain == "faces" else mesh.n_vertices
+    if len(field) != expected:
+        raise FieldError(
+            f"the field has {len(field)} crosses, the mesh {expected} {field.domain}; repair may "
+            "have changed the mesh: predict on what vhquad.load gives"
+        )
+    return field
+
+
+def describe_field(
+    mesh: TriMesh,
+    field: CrossField,
+    repair_lines: Sequence[str] = (),
+    seconds: Mapping[str, float] | None = None,
+) -> FieldReport:
+    """Figures of a field on a mesh."""
+    singular = find_singularities(mesh, field)
+    size, quads = None, None
+    if field.size is not None:
+        known = field.size > 0
+        area = mesh.face_areas if field.domain == "faces" else mesh.vertex_areas
+        if known.any():
+            values = field.size[known]
+            size = {
+                "least": float(values.min()),
+                "median": float(np.median(values)),
+                "largest": float(values.max()),
+            }
+            quads = round(float((area[known] / values**2).sum()))
+    return FieldReport(
+        input=MeshCounts.of(mesh),
+        singularities=singular.by_quads,
+        index_sum=singular.total,
+        size=size,
+        quads=quads,
+        repair=tuple(repair_lines),
+        seconds=dict(seconds or {}),
+    )
+
+
+@contextmanager
+def clock(seconds: dict[str, float], step: str) -> Iterator[None]:
+    """Add the wall time of a step."""
+    start = time.perf_counter()
+    try:
+        yield
+    finally:
+        seconds[step] = seconds.get(step, 0.0) + time.perf_counter() - start

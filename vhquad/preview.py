@@ -1,0 +1,222 @@
+"""A picture of a remesh: the input, its cross field, the quads, side by side; needs no display.
+
+Drawn by pyvista (the extra ``viz``), off screen, which works without a display or graphics card.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vhquad.atomic import atomic_path
+from vhquad.errors import ConfigError
+from vhquad.field.cross import CrossField
+from vhquad.field.singular import find_singularities
+from vhquad.field.transport import to_faces
+from vhquad.geometry.frames import face_axes, to_3d
+from vhquad.mesh.quad import QuadMesh
+from vhquad.mesh.triangle import TriMesh
+
+__all__ = ["COLOURS", "check_viz", "draw_preview"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+COLOURS = {2: "#9b30b0", 3: "#d7301f", 5: "#2166ac", 6: "#08a8a0"}
+"""Colour of a vertex by its quads; 2 stands for fewer too, 6 for more."""
+
+PANEL = (760, 860)  # pixels
+SURFACE, CROSS, EDGE = "#dcdcd6", "#3c3c3c", "#303030"
+CROSSES = 2500  # drawn, about
+ARM = 0.42  # half a cross, of the mean distance between crosses
+LIFT = 0.12  # of an arm, so that crosses stand clear of the surface
+MARGIN = 1.2
+
+
+@dataclass(frozen=True)
+class _View:
+    """Where the camera stands: the same for all panels."""
+
+    focus: Floats
+    position: Floats
+    up: tuple[float, float, float]
+    scale: float
+
+
+def check_viz() -> None:
+    """Refuse a preview before the long work if its library is missing.
+
+    Raises
+    ------
+    ConfigError
+    """
+    try:
+        import pyvista  # noqa: F401
+    except ImportError as error:
+        raise ConfigError(
+            f"a preview needs the extra viz ({error}); install it with: pip install 'vhquad[viz]'"
+        ) from None
+
+
+def draw_preview(
+    path: str | os.PathLike[str], mesh: TriMesh, field: CrossField, quads: QuadMesh
+) -> None:
+    """Draw three panels to a PNG file: triangles; crosses and singularities; quads.
+
+    Parameters
+    ----------
+    path : str or PathLike
+        A ``.png`` file, written whole or not at all.
+    mesh : TriMesh
+        The input.
+    field : CrossField
+        On its vertices or faces.
+    quads : QuadMesh
+        The result; irregular vertices are marked by valence.
+
+    Raises
+    ------
+    ConfigError
+        If pyvista is not installed.
+    """
+    check_viz()
+    import pyvista as pv
+    import vtk
+
+    vtk.vtkObject.GlobalWarningDisplayOff()  # it complains of the missing display, then copes
+    height = PANEL[1]
+    plotter = pv.Plotter(
+        off_screen=True, shape=(1, 3), window_size=[3 * PANEL[0], height], border=False
+    )
+    try:
+        plotter.set_background("white")
+        view = _view(mesh)
+        _panel(plotter, 0, f"input: {mesh.n_faces:,} triangles", view)
+        _surface(plotter, pv.PolyData.from_regular_faces(mesh.vertices, mesh.faces), 0.6)
+        _field_panel(plotter, pv, mesh, field, view)
+        _quad_panel(plotter, pv, quads, view, mesh.diagonal)
+        with atomic_path(path) as temporary:
+            plotter.screenshot(str(temporary))
+    finally:
+        plotter.close()
+
+
+def _field_panel(plotter: Any, pv: Any, mesh: TriMesh, field: CrossField, view: _View) -> None:
+    singular = find_singularities(mesh, field)
+    _panel(plotter, 1, f"cross field: {len(singular)} singularities", view)
+    smooth = pv.PolyData.from_regular_faces(mesh.vertices, mesh.faces)
+    plotter.add_mesh(smooth, color=SURFACE, smooth_shading=True, ambient=0.35, specular=0.0)
+    start, end = _segments(mesh, field)
+    count = len(start)
+    ends = np.stack([np.full(count, 2), np.arange(count), np.arange(count) + count], axis=1)
+    lines = pv.PolyData(np.concatenate([start, end]), lines=ends)
+    plotter.add_mesh(lines, color=CROSS, line_width=1.6, lighting=False)
+    points = mesh.vertices[singular.vertex]
+    _marks(plotter, pv, points, 4 - singular.quarters, mesh.diagonal, "index +1/4", "index -1/4")
+
+
+def _quad_panel(plotter: Any, pv: Any, quads: QuadMesh, view: _View, diagonal: float) -> None:
+    irregular = np.flatnonzero(
+        ~quads.is_boundary_vertex & (quads.valence > 0) & (quads.valence != 4)
+    )
+    _panel(plotter, 2, f"{quads.n_quads:,} quads: {len(irregular)} irregular vertices", view)
+    if quads.n_quads:
+        _surface(plotter, pv.PolyData.from_regular_faces(quads.vertices, quads.quads), 1.2)
+    points, valence = quads.vertices[irregular], quads.valence[irregular]
+    _marks(plotter, pv, points, valence, diagonal, "valence 3", "valence 5")
+
+
+def _surface(plotter: Any, surface: Any, width: float) -> None:
+    plotter.add_mesh(
+        surface,
+        color=SURFACE,
+        show_edges=True,
+        edge_color=EDGE,
+        line_width=width,
+        ambient=0.35,
+        specular=0.0,
+    )
+
+
+def _marks(
+    plotter: Any, pv: Any, points: Floats, quads: Ints, diagonal: float, three: str, five: str
+) -> None:
+    """Balls at singular or irregular vertices, coloured by their quads, and a legend."""
+    names = {2: "fewer", 3: three, 5: five, 6: "more"}
+    kind = np.clip(quads, 2, 6)
+    legend = []
+    for value, colour in COLOURS.items():
+        chosen = points[kind == value]
+        if len(chosen) == 0:
+            continue
+        ball = pv.Sphere(radius=0.0055 * diagonal, theta_resolution=12, phi_resolution=12)
+        balls = pv.PolyData(chosen).glyph(geom=ball, scale=False, orient=False)
+        plotter.add_mesh(balls, color=colour, ambient=0.5, specular=0.0)
+        legend.append([f"{len(chosen)} {names[value]}", colour])
+    if legend:
+        plotter.add_legend(
+            legend,
+            face="circle",
+            bcolor=None,
+            size=(0.28, 0.035 * len(legend)),
+            loc="lower left",
+            font_family="arial",
+        )
+
+
+def _segments(mesh: TriMesh, field: CrossField) -> tuple[Floats, Floats]:
+    """Both lines of a cross at faces spread evenly over the surface; ends (2q, 3) each."""
+    crosses = field if field.domain == "faces" else to_faces(mesh, field)
+    spacing = np.sqrt(mesh.area / CROSSES)
+    centre = mesh.vertices[mesh.faces].mean(axis=1)
+    known = np.flatnonzero((crosses.z != 0) & (mesh.face_areas > 0))
+    cell = np.floor(centre[known] / spacing).astype(np.int64)
+    known = known[np.unique(cell, axis=0, return_index=True)[1]]
+    length = ARM * np.sqrt(mesh.area / max(len(known), 1))
+    axes = face_axes(mesh)
+    u = np.exp(1j * crosses.angle)
+    centre = centre[known] + LIFT * length * mesh.face_normals[known]
+    arms = [length * to_3d(u * turn, axes)[known] for turn in (1.0, 1j)]
+    start = np.concatenate([centre - arm for arm in arms])
+    return start, np.concatenate([centre + arm for arm in arms])
+
+
+def _panel(plotter: Any, column: int, title: str, view: _View) -> None:
+    plotter.subplot(0, column)
+    plotter.add_text(title, font_size=11, color="black", position="upper_edge", font="arial")
+    plotter.camera.focal_point = view.focus
+    plotter.camera.position = view.position
+    plotter.camera.up = view.up
+    plotter.camera.parallel_projection = True
+    plotter.camera.parallel_scale = view.scale
+
+
+def _view(mesh: TriMesh) -> _View:
+    """From the front, the right and above, all of the mesh in sight and room for the legend."""
+    z_up = _stands_on_z(mesh)
+    up = (0.0, 0.0, 1.0) if z_up else (0.0, 1.0, 0.0)
+    direction = np.array([0.55, -1.0, 0.25] if z_up else [0.55, 0.25, 1.0])
+    direction /= np.linalg.norm(direction)
+    side = np.cross(up, direction)
+    side /= np.linalg.norm(side)
+    top = np.cross(direction, side)
+    focus = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
+    across, along = (mesh.vertices - focus) @ side, (mesh.vertices - focus) @ top
+    focus = focus + 0.5 * ((across.min() + across.max()) * side + (along.min() + along.max()) * top)
+    scale = 0.5 * MARGIN * max(float(np.ptp(along)), float(np.ptp(across)) * PANEL[1] / PANEL[0])
+    focus = focus - 0.05 * scale * top
+    return _View(focus, focus + 3.0 * mesh.diagonal * direction, up, scale)
+
+
+def _stands_on_z(mesh: TriMesh) -> bool:
+    """Guess whether z points up, not y: by where the openings are, as at a neck, if there are."""
+    if mesh.is_closed:
+        return False
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    opening = mesh.vertices[mesh.is_boundary_vertex].mean(axis=0)
+    depth = (0.5 * (low + high) - opening) / np.maximum(high - low, 1e-12 * mesh.diagonal)
+    return bool(depth[2] > max(depth[1], 0.2))
