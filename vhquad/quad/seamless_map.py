@@ -77,39 +77,62 @@ def twice_area(uv: Ints) -> Ints:
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
+@dataclass(frozen=True)
+class _Schedule:
+    """A way of stiffening: the largest weight, the rings around bad triangles, and whether
+    distorted triangles count as bad besides nearly folded ones."""
+
+    cap: float
+    rings: int
+    distorted: bool
+
+
+# Which of these ends without folds differs from mesh to mesh; the first mostly does.
+_SCHEDULES = (_Schedule(1e2, 1, True), _Schedule(1e4, 2, True), _Schedule(1e4, 1, False))
+_SOLVES_EACH = 12
+_PATIENCE = 4  # solves without fewer folds before the next schedule
+
+
 def solve_seamless_map(
-    aligned: AlignedField,
-    *,
-    max_solves: int = 20,
-    on_solve: Callable[[int, int], None] | None = None,
+    aligned: AlignedField, *, on_solve: Callable[[int, int], None] | None = None
 ) -> SeamlessMap:
     """Seamless map of an aligned field; check ``is_valid`` on the result.
 
     Parameters
     ----------
     aligned : AlignedField
-    max_solves : int
-        Bound on the number of stiffening rounds.
     on_solve : callable, optional
-        Called with (round, folded triangles) after each solve.
+        Called with (solves so far, folded triangles) after each solve.
     """
     space = seamless_space(aligned)
     problem = _Problem(aligned, space)
-    weight = np.ones(aligned.mesh.n_faces)
     best: SeamlessMap | None = None
-    for number in range(1, max_solves + 1):
-        unknowns = problem.solve(weight)
-        candidate = _snap(aligned, space, problem, unknowns, number)
-        if on_solve is not None:
-            on_solve(number, candidate.flips)
-        if best is None or (candidate.flips, candidate.wrong_angles) < (
-            best.flips,
-            best.wrong_angles,
-        ):
-            best = candidate
-        if candidate.is_valid:
-            return candidate
-        weight = problem.stiffen(weight, unknowns)
+    solves = 0
+    for schedule in _SCHEDULES:
+        weight = np.ones(aligned.mesh.n_faces)
+        least, waited = aligned.mesh.n_faces + 1, 0
+        for number in range(_SOLVES_EACH):
+            if number == 0 and best is not None:
+                weight = problem.stiffen(weight, first, schedule)  # the first solve is shared
+            unknowns = problem.solve(weight)
+            if best is None:
+                first = unknowns
+            solves += 1
+            candidate = _snap(aligned, space, problem, unknowns, solves)
+            if on_solve is not None:
+                on_solve(solves, candidate.flips)
+            if best is None or (candidate.flips, candidate.wrong_angles) < (
+                best.flips,
+                best.wrong_angles,
+            ):
+                best = candidate
+            if candidate.is_valid:
+                return candidate
+            waited = 0 if candidate.flips < least else waited + 1
+            least = min(least, candidate.flips)
+            if waited == _PATIENCE:
+                break
+            weight = problem.stiffen(weight, unknowns, schedule)
     assert best is not None
     return best
 
@@ -178,8 +201,8 @@ class _Problem:
         z = flat[0::2] + 1j * flat[1::2]
         return np.asarray(z[self.wedge])
 
-    def stiffen(self, weight: Floats, unknowns: Floats) -> Floats:
-        """Doubled weights on folded and distorted triangles and their neighbours."""
+    def stiffen(self, weight: Floats, unknowns: Floats, schedule: _Schedule) -> Floats:
+        """Doubled weights on folded and distorted triangles and the rings around them."""
         z = self.corners(unknowns)
         # Complex derivatives: gradients are d/dx + i d/dy of the hat functions.
         holomorphic = 0.5 * (z * self.gradient.conj()).sum(axis=1)
@@ -188,12 +211,14 @@ class _Problem:
         off = 2 * (
             np.abs(holomorphic / self.target.conj() - 1) ** 2 + np.abs(anti / self.target) ** 2
         )
-        bad = (jacobian < 0.1) | (off > 1.5**2)
-        grown = bad.copy()
-        touched = np.zeros(self.mesh.n_vertices, dtype=bool)
-        touched[self.mesh.faces[bad]] = True
-        grown |= touched[self.mesh.faces].any(axis=1)
-        return np.where(grown, np.minimum(2 * weight, 50.0 * 2), weight)
+        bad = jacobian < 0.1
+        if schedule.distorted:
+            bad |= off > 1.5**2
+        for _ in range(schedule.rings):
+            touched = np.zeros(self.mesh.n_vertices, dtype=bool)
+            touched[self.mesh.faces[bad]] = True
+            bad = touched[self.mesh.faces].any(axis=1)
+        return np.where(bad, np.minimum(2 * weight, schedule.cap), weight)
 
 
 def _local_corners(mesh: TriMesh) -> NDArray[np.complex128]:

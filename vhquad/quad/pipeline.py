@@ -1,0 +1,378 @@
+"""From a triangle mesh and a cross field to quads: every component by itself, valid in the end.
+
+For each component the field is aligned (:mod:`vhquad.field.align`), turned into a seamless map
+(:mod:`vhquad.quad.seamless_map`), cut into rectangles (:mod:`vhquad.quad.tmesh`), quantised
+(:mod:`vhquad.quad.quantize`), laid on the surface (:mod:`vhquad.quad.embed`) and polished
+(:mod:`vhquad.quad.smooth`). Where no valid map is found the field is smoothed further, then
+creases are given up, and at last triangles are paired (:mod:`vhquad.quad.fallback`).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vhquad.errors import ConfigError, FieldError, ParametrizationError
+from vhquad.field.align import AlignedField, AlignSettings, align_field
+from vhquad.field.cross import CrossField
+from vhquad.field.features import find_creases
+from vhquad.field.transport import to_faces
+from vhquad.mesh.closest import ClosestPoints
+from vhquad.mesh.quad import QuadMesh
+from vhquad.mesh.quality import check_quads
+from vhquad.mesh.triangle import TriMesh
+from vhquad.quad.curves import CurveConstraints
+from vhquad.quad.embed import embed_layout
+from vhquad.quad.fallback import triangles_to_quads
+from vhquad.quad.layout import Layout
+from vhquad.quad.motorcycle import trace
+from vhquad.quad.quantize import quantise
+from vhquad.quad.seamless_map import solve_seamless_map
+from vhquad.quad.smooth import smooth_quads
+from vhquad.quad.tmesh import build_tmesh
+from vhquad.report import ComponentReport, MeshCounts, RemeshReport
+
+__all__ = ["RemeshResult", "RemeshSettings", "remesh_mesh"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+DEFAULT_QUADS = 4000  # where neither a count nor a size is given
+LEAST_QUADS = 6
+SIZE_RANGE = 8.0  # sizes are kept within this factor of their median
+NEAR_COUNT = 1.10
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class RemeshSettings:
+    """What to make.
+
+    Attributes
+    ----------
+    target_quads : int, optional
+        Wanted number of quads. Default: what the sizes of the field amount to, else 4,000.
+    edge_length : float, optional
+        Mean quad edge length instead of a count, in units of the mesh.
+    crease : float or None
+        Edges sharper than this angle (degrees) become edges of quads; None for none.
+    adaptivity : float
+        0 for uniform quads, 1 for the sizes of the field, anything between.
+    seed : int
+        Recorded in the report; the same input, settings and seed give the same quads.
+    """
+
+    target_quads: int | None = None
+    edge_length: float | None = None
+    crease: float | None = 40.0
+    adaptivity: float = 1.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.target_quads is not None and self.edge_length is not None:
+            raise ConfigError("give --target-quads or --edge-length, not both")
+        if self.target_quads is not None and self.target_quads < 1:
+            raise ConfigError(f"--target-quads must be at least 1, not {self.target_quads}")
+        if self.edge_length is not None and not 0 < self.edge_length < np.inf:
+            raise ConfigError(f"--edge-length must be positive, not {self.edge_length}")
+        if self.crease is not None and not 0 < self.crease < 180:
+            raise ConfigError(f"--crease must lie between 0 and 180 degrees, not {self.crease}")
+        if not 0 <= self.adaptivity <= 1:
+            raise ConfigError(f"--adaptivity must lie between 0 and 1, not {self.adaptivity}")
+
+
+@dataclass(frozen=True, eq=False)
+class RemeshResult:
+    """Quads, and the report of how they were made."""
+
+    quads: QuadMesh
+    report: RemeshReport
+
+
+@dataclass
+class _Watch:
+    """Seconds by step."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def __call__(self, step: str) -> Iterator[None]:
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[step] = self.seconds.get(step, 0.0) + time.perf_counter() - start
+
+
+def remesh_mesh(
+    mesh: TriMesh,
+    field: CrossField,
+    settings: RemeshSettings | None = None,
+    *,
+    creases: ArrayLike | None = None,
+    progress: Progress | None = None,
+) -> RemeshResult:
+    """Quads along a cross field.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+        Manifold and oriented, any genus, boundaries and number of components.
+    field : CrossField
+        On vertices or faces; its sizes steer the density.
+    settings : RemeshSettings, optional
+    creases : (k, 2) array_like of int, optional
+        Edges that quads must follow, instead of those found by angle.
+    progress : callable, optional
+        Called with (step, share done).
+
+    Raises
+    ------
+    FieldError
+        If the field does not fit the mesh.
+    """
+    settings = settings or RemeshSettings()
+    watch = _Watch()
+    if field.domain == "vertices":
+        if len(field) != mesh.n_vertices:
+            raise FieldError(f"the field has {len(field)} crosses, the mesh {mesh.n_vertices} vertices")
+        field = to_faces(mesh, field)
+    if len(field) != mesh.n_faces:
+        raise FieldError(f"the field has {len(field)} crosses, the mesh {mesh.n_faces} faces")
+    size, asked = _sizes(mesh, field, settings)
+    field = replace(field, size=size)
+    sharp = _creases(mesh, settings, creases, float(np.median(size)))
+    quads: list[QuadMesh] = []
+    reports: list[ComponentReport] = []
+    n_parts = mesh.n_components
+    density = mesh.face_areas / size**2
+    for number in range(n_parts):
+        report_progress = progress or (lambda step, share: None)
+
+        def tell(step: str, share: float, number: int = number) -> None:
+            report_progress(step, (number + share) / n_parts)
+
+        inside = mesh.face_component == number
+        part, used = mesh.submesh(inside)
+        local = np.full(mesh.n_vertices, -1)
+        local[used] = np.arange(len(used))
+        own = local[sharp]
+        own = own[(own >= 0).all(axis=1)]
+        part_field = CrossField(
+            "faces",
+            field.z[inside],
+            size[inside],
+            None if field.confidence is None else field.confidence[inside],
+        )
+        target = max(round(float(density[inside].sum())), LEAST_QUADS)
+        made, report = _remesh_part(part, part_field, own, target, tell)
+        quads.append(made)
+        reports.append(report)
+    result = _joined(quads)
+    with watch("check"):
+        quality = check_quads(result, mesh)
+    seconds = dict(watch.seconds)
+    for report in reports:
+        for step, value in report.seconds.items():
+            seconds[step] = seconds.get(step, 0.0) + value
+    return RemeshResult(
+        quads=result,
+        report=RemeshReport(
+            asked=asked,
+            made=result.n_quads,
+            input=MeshCounts.of(mesh),
+            output=MeshCounts.of(result),
+            quality=quality,
+            components=tuple(reports),
+            seconds=seconds,
+            settings={
+                name: getattr(settings, name) for name in RemeshSettings.__dataclass_fields__
+            },
+        ),
+    )
+
+
+def _sizes(mesh: TriMesh, field: CrossField, settings: RemeshSettings) -> tuple[Floats, int]:
+    """Wanted edge length of each face and the number of quads that these amount to."""
+    if field.size is None or not (field.size > 0).any():
+        size = np.ones(mesh.n_faces)
+        native = None
+    else:
+        middle = float(np.median(field.size[field.size > 0]))
+        size = np.where(field.size > 0, field.size, middle)
+        size = np.clip(size, middle / SIZE_RANGE, middle * SIZE_RANGE)
+        native = float((mesh.face_areas / size**2).sum())
+        mean = np.exp(np.average(np.log(size), weights=mesh.face_areas + 1e-300))
+        size = mean * (size / mean) ** settings.adaptivity
+    if settings.target_quads is not None:
+        target = float(settings.target_quads)
+    elif settings.edge_length is not None:
+        target = mesh.area / settings.edge_length**2
+    else:
+        target = native if native is not None else float(DEFAULT_QUADS)
+    count = float((mesh.face_areas / size**2).sum())
+    return size * np.sqrt(count / target), max(round(target), 1)
+
+
+def _creases(
+    mesh: TriMesh, settings: RemeshSettings, given: ArrayLike | None, length: float
+) -> Ints:
+    if given is not None:
+        return np.asarray(given, dtype=np.int64).reshape(-1, 2)
+    if settings.crease is None:
+        return np.zeros((0, 2), dtype=np.int64)
+    return find_creases(mesh, settings.crease, shortest=2.5 * length)
+
+
+def _joined(parts: list[QuadMesh]) -> QuadMesh:
+    offset = np.cumsum([0, *(part.n_vertices for part in parts)])
+    return QuadMesh(
+        np.concatenate([part.vertices for part in parts]),
+        np.concatenate([part.quads + o for part, o in zip(parts, offset[:-1], strict=True)]),
+    )
+
+
+@dataclass(frozen=True)
+class _Attempt:
+    """One way to try: smoothing of the field in wanted edge lengths, with or without creases."""
+
+    smoothing: float
+    creases: bool
+
+
+_ATTEMPTS = (
+    _Attempt(0.5, True),
+    _Attempt(1.5, True),
+    _Attempt(4.0, True),
+    _Attempt(1.5, False),
+)
+
+
+def _remesh_part(
+    mesh: TriMesh, field: CrossField, creases: Ints, target: int, tell: Progress
+) -> tuple[QuadMesh, ComponentReport]:
+    """Quads of one component by the first attempt that gives a valid mesh of about the count."""
+    watch = _Watch()
+    surface = ClosestPoints(mesh)
+    reasons: list[str] = []
+    best: tuple[float, QuadMesh, AlignedField, str] | None = None
+    for attempt in _ATTEMPTS:
+        if not attempt.creases and len(creases) == 0:
+            continue
+        sharp = creases if attempt.creases else creases[:0]
+        try:
+            quads, aligned = _by_map(mesh, field, sharp, target, attempt, surface, watch, tell)
+        except (ParametrizationError, FieldError) as problem:
+            reasons.append(str(problem))
+            continue
+        miss = abs(np.log(quads.n_quads / target))
+        method = "integer-grid map"
+        if attempt is not _ATTEMPTS[0]:
+            method = "integer-grid map, smoother field"
+            if not attempt.creases:
+                method = "integer-grid map, creases given up"
+        if best is None or miss < best[0]:
+            best = (miss, quads, aligned, method)
+        if miss <= np.log(NEAR_COUNT):
+            break
+        reasons.append(f"{quads.n_quads} quads where {target} were asked for")
+    if best is not None:
+        _, quads, aligned, method = best
+        singularities, cancelled = aligned.report.singularities, aligned.report.pairs_cancelled
+    else:
+        with watch("fallback"):
+            quads = triangles_to_quads(mesh, target, angle=field.angle)
+        method, singularities, cancelled = "paired triangles", {}, 0
+    tell("done", 1.0)
+    return quads, ComponentReport(
+        vertices=mesh.n_vertices,
+        faces=mesh.n_faces,
+        target=target,
+        made=quads.n_quads,
+        method=method,
+        reason="" if method == "integer-grid map" else "; ".join(dict.fromkeys(reasons)),
+        singularities=singularities,
+        cancelled=cancelled,
+        seconds=dict(watch.seconds),
+    )
+
+
+def _by_map(
+    mesh: TriMesh,
+    field: CrossField,
+    creases: Ints,
+    target: int,
+    attempt: _Attempt,
+    surface: ClosestPoints,
+    watch: _Watch,
+    tell: Progress,
+) -> tuple[QuadMesh, AlignedField]:
+    """Quads by an integer-grid map.
+
+    Raises
+    ------
+    ParametrizationError, FieldError
+        If there is no valid map, or its quads are not a valid mesh of the input's topology.
+    """
+    tell("align the field", 0.0)
+    length = float(np.sqrt(mesh.area / target))
+    with watch("align"):
+        settings = AlignSettings(edge_length=length, smoothing=attempt.smoothing)
+        aligned = align_field(mesh, field, creases, settings)
+    tell("map", 0.15)
+    with watch("map"):
+        seamless = solve_seamless_map(aligned)
+    if not seamless.is_valid:
+        raise ParametrizationError(
+            f"{seamless.flips} triangles of the map stay folded after {seamless.solves} solves"
+        )
+    tell("quantise", 0.5)
+    with watch("quantise"):
+        tmesh = build_tmesh(aligned, seamless, trace(aligned, seamless))
+        layout = quantise(tmesh, target, seamless.area).layout
+    tell("lay out", 0.7)
+    with watch("lay out"):
+        vertices = embed_layout(layout, aligned, seamless)
+    draft = QuadMesh(vertices, layout.quads)
+    _require_topology(draft, mesh)
+    tell("polish", 0.75)
+    with watch("polish"):
+        fixed, curves = _constraints(layout)
+        vertices = smooth_quads(vertices, layout.quads, surface, fixed, curves)
+    return QuadMesh(vertices, layout.quads), aligned
+
+
+def _require_topology(quads: QuadMesh, mesh: TriMesh) -> None:
+    if not quads.is_manifold or len(quads.degenerate_quads):
+        raise ParametrizationError("the quads of the map do not form a manifold")
+    made, wanted = MeshCounts.of(quads).topology, MeshCounts.of(mesh).topology
+    if made != wanted:
+        raise ParametrizationError(
+            f"the quads of the map have (components, Euler characteristic, boundary loops) {made} "
+            f"instead of {wanted}"
+        )
+
+
+def _constraints(layout: Layout) -> tuple[NDArray[np.bool_], CurveConstraints]:
+    """Vertices that the polish must not move, and the feature curves on which others slide."""
+    tmesh = layout.tmesh
+    curve = np.full(layout.n_vertices, -1, dtype=np.int64)
+    on = np.flatnonzero(tmesh.node_feature >= 0)
+    curve[layout.vertex_of[on]] = tmesh.node_feature[on]
+    for a, arc in enumerate(tmesh.arcs):
+        if arc.feature >= 0:
+            curve[layout.vertex_of[layout.half_arc_points(2 * a)]] = arc.feature
+    fixed = np.zeros(layout.n_vertices, dtype=bool)
+    fixed[layout.vertex_of[np.flatnonzero(tmesh.node_fixed)]] = True
+    curve[fixed] = -1
+    closed = [bool(np.array_equal(c[0], c[-1])) for c in tmesh.curves]
+    lines = [c[:-1] if loop else c for c, loop in zip(tmesh.curves, closed, strict=True)]
+    return fixed, CurveConstraints(lines, closed, curve)
+
+
