@@ -1,10 +1,10 @@
 """Smallest eigenpairs of a Laplacian, orthonormal in the mass.
 
-Large meshes get a block Lanczos iteration of the inverse in single precision, closed by a
-Rayleigh-Ritz step in double: three to four times faster than ARPACK, the span good to about 5e-4
-(sine of the largest angle) and the eigenvalues to 1e-5, which is all that diffusion uses. Small
-meshes get ARPACK or a dense solver in double precision; so do those whose triangles are so bad that
-single precision fails, after block Lanczos in double.
+Large meshes get a block Lanczos iteration of the inverse in single precision (double where slivers
+ask for it), closed by a Rayleigh-Ritz step in double: three to four times faster than ARPACK, the
+span good to 1e-3 (sine of the largest angle) and the eigenvalues to 1e-5, which is all that
+diffusion uses. Small meshes get ARPACK or a dense solver, in double precision; so does whatever
+block Lanczos gives up on.
 """
 
 from __future__ import annotations
@@ -72,8 +72,8 @@ def smallest_eigenpairs(
     if n < _DENSE_BELOW or 4 * k > n:
         found = eigh(standard.toarray(), subset_by_index=(0, k - 1))
     elif n >= _EXACT_BELOW if exact is None else not exact:
-        rough = standard.diagonal().real.max() < _SINGLE_UP_TO
-        found = _block_lanczos(standard, k, single=True) if rough else None
+        tame = standard.diagonal().real.max() < _SINGLE_UP_TO
+        found = _block_lanczos(standard, k, single=True) if tame else None
         found = _block_lanczos(standard, k, single=False) if found is None else found
     values, vectors = _arpack(standard, k) if found is None else found
     return Spectrum(unit * np.maximum(values, 0.0), vectors / root[:, None])
@@ -121,7 +121,7 @@ def _block_lanczos(standard: csr_matrix, k: int, single: bool) -> tuple[NDArray,
     basis = np.zeros((n, most), dtype=dtype, order="F")
     projected = np.zeros((most, most), dtype=np.result_type(dtype, np.float64))
     rng = np.random.default_rng(0)
-    # Smooth from the start: what is stiff must not enter, small as it may be, as it has much energy.
+    # Smooth from the start: the least share of a stiff mode (a sliver's) would have much energy.
     block = np.linalg.qr(factor.solve(rng.standard_normal((n, _BLOCK)).astype(dtype)))[0]
     link = np.zeros((_BLOCK, _BLOCK), dtype=dtype)
     for j in range(0, most, _BLOCK):
