@@ -13,15 +13,18 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vhquad.errors import ConfigError, FieldError
+from vhquad.errors import ConfigError, FieldError, MeshError
 from vhquad.field.cross import CrossField
 from vhquad.field.io import read_field
 from vhquad.field.singular import find_singularities
+from vhquad.mesh.io import read_polygons
 from vhquad.mesh.load import LoadedMesh, load
+from vhquad.mesh.quad import QuadMesh
+from vhquad.mesh.quality import check_quads
 from vhquad.mesh.repair import repair
 from vhquad.mesh.triangle import TriMesh
 from vhquad.quad.pipeline import RemeshResult, RemeshSettings, remesh_mesh
-from vhquad.report import FieldReport, MeshCounts
+from vhquad.report import CheckReport, FieldReport, MeshCounts
 
 if TYPE_CHECKING:
     from vhquad.nn.checkpoint import Model
@@ -29,6 +32,7 @@ if TYPE_CHECKING:
 __all__ = [
     "LoadedMesh",
     "Method",
+    "check",
     "clock",
     "describe_field",
     "load",
@@ -224,6 +228,25 @@ def own_field(mesh: TriMesh, field: CrossField | str | PathLike[str]) -> CrossFi
             "have changed the mesh: predict on what vhquad.load gives"
         )
     return field
+
+
+def check(quads: str | PathLike[str], against: str | PathLike[str] | None = None) -> CheckReport:
+    """Judge the quad mesh in a file, on its own or against the surface it stands for.
+
+    Raises
+    ------
+    MeshError
+        If a file cannot be read.
+    """
+    soup = read_polygons(quads)
+    faces, _ = soup.of_size(4)
+    surface = None if against is None else load(against).mesh
+    try:
+        mesh = QuadMesh(soup.vertices, faces)
+    except MeshError as error:
+        raise MeshError(f"{quads}: {error}") from None
+    quality = replace(check_quads(mesh, surface), non_quads=soup.n_faces - len(faces))
+    return CheckReport(quality, None if surface is None else MeshCounts.of(surface))
 
 
 def describe_field(

@@ -10,7 +10,7 @@ import types
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from importlib import metadata
-from typing import TYPE_CHECKING, Any, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -24,17 +24,19 @@ if TYPE_CHECKING:
     from vhquad.mesh.triangle import TriMesh
 
 __all__ = [
+    "CheckReport",
     "ComponentReport",
     "FieldReport",
     "MeshCounts",
     "RemeshReport",
     "from_plain",
     "plain",
+    "quality_shortfalls",
     "versions",
     "write_json",
 ]
 
-T = TypeVar("T")
+COUNT_BAND = 0.10  # of the count asked for; a result farther off is a shortfall
 
 
 @dataclass(frozen=True)
@@ -155,10 +157,29 @@ class RemeshReport:
         """Whether components, Euler characteristic and boundary loops are those of the input."""
         return self.input.topology == self.output.topology
 
+    def shortfalls(self) -> tuple[str, ...]:
+        """What a user should know before using the result, a line each; empty if all is well."""
+        lines = list(self.warnings)
+        if self.made == 0 or abs(self.made - self.asked) > COUNT_BAND * self.asked:
+            lines.append(f"{self.made} quads were made where {self.asked} were asked for")
+        if not self.topology_kept:
+            lines.append(
+                "components, Euler characteristic and boundary loops are "
+                f"{self.output.topology}, those of the input {self.input.topology}"
+            )
+        if self.quality is not None:
+            lines += quality_shortfalls(self.quality)
+        for number, part in enumerate(self.components):
+            if part.reason:
+                where = f"component {number}: " if len(self.components) > 1 else ""
+                lines.append(f"{where}{part.method} was used: {part.reason}")
+        return tuple(lines)
+
     def to_dict(self) -> dict[str, Any]:
         """As plain JSON values; :meth:`from_dict` reads them back."""
         values = plain(self)
         values["topology_kept"] = self.topology_kept
+        values["shortfalls"] = list(self.shortfalls())
         return dict(values)
 
     @classmethod
@@ -173,6 +194,54 @@ class RemeshReport:
         known = {f.name for f in fields(cls)}
         report: RemeshReport = from_plain(cls, {k: v for k, v in values.items() if k in known})
         return report
+
+
+@dataclass(frozen=True)
+class CheckReport:
+    """What is found in a quad mesh, from here or elsewhere.
+
+    Attributes
+    ----------
+    quality : QualityReport
+        Of its quads; faces that are no quads are counted and otherwise left out.
+    input : MeshCounts or None
+        The surface it was compared with.
+    """
+
+    quality: QualityReport
+    input: MeshCounts | None = None
+
+    @property
+    def is_valid(self) -> bool:
+        """Whether it is a manifold mesh of quads only."""
+        return self.quality.is_valid
+
+    def shortfalls(self) -> tuple[str, ...]:
+        """What is wrong or differs from the surface, a line each."""
+        lines = quality_shortfalls(self.quality)
+        q = self.quality
+        topology = (q.components, q.euler_characteristic, q.boundary_loops)
+        if self.input is not None and topology != self.input.topology:
+            lines.append(
+                "components, Euler characteristic and boundary loops are "
+                f"{topology}, those of the surface {self.input.topology}"
+            )
+        return tuple(lines)
+
+
+def quality_shortfalls(quality: QualityReport) -> list[str]:
+    """What makes a quad mesh invalid or bad to use, a line each."""
+    counts = {
+        "faces that are not quads": quality.non_quads,
+        "edges with more than two quads": quality.nonmanifold_edges,
+        "vertices where several fans of quads meet": quality.nonmanifold_vertices,
+        "edges whose quads are wound against each other": quality.misoriented_edges,
+        "quads without area or with a vertex twice": quality.degenerate_quads,
+        "vertices that no quad uses": quality.unused_vertices,
+        "folded quads (a scaled Jacobian of 0 or less)": quality.folded_quads,
+        "quads that face against the surface": quality.flipped_quads,
+    }
+    return [f"{count} {text}" for text, count in counts.items() if count]
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,223 @@
+"""`vhquad remesh`: a triangle mesh to quads."""
+
+from __future__ import annotations
+
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from vhquad.cli.guard import INVALID, Shell, guarded, warn
+from vhquad.cli.options import (
+    Device,
+    FullResolution,
+    JsonFile,
+    Mesh,
+    ModelFile,
+    NoCache,
+    parse_crease,
+)
+from vhquad.cli.outputs import MESHES, check_outputs, json_file
+from vhquad.errors import ConfigError
+
+if TYPE_CHECKING:
+    from vhquad.mesh.load import LoadedMesh
+    from vhquad.quad.pipeline import RemeshResult
+
+__all__ = ["remesh"]
+
+
+class Method(str, Enum):
+    """Where the cross field comes from."""
+
+    learned = "learned"
+    curvature = "curvature"
+
+
+@guarded
+def remesh(
+    ctx: typer.Context,
+    mesh: Mesh,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            "-o",
+            metavar="FILE",
+            help="The quads: .obj, .ply or .off.  [default: MESH_quads.obj]",
+            show_default=False,
+        ),
+    ] = None,
+    target_quads: Annotated[
+        int | None,
+        typer.Option(
+            "--target-quads",
+            "-n",
+            metavar="N",
+            help="How many quads to make.  [default: what the predicted sizes amount to]",
+            show_default=False,
+        ),
+    ] = None,
+    edge_length: Annotated[
+        float | None,
+        typer.Option(
+            "--edge-length",
+            metavar="L",
+            help="Mean edge length of the quads, in units of the mesh, in place of a number.",
+            show_default=False,
+        ),
+    ] = None,
+    adaptivity: Annotated[
+        float,
+        typer.Option(
+            "--adaptivity",
+            metavar="A",
+            help="0 for quads of one size, 1 for the sizes of the field, or between.",
+        ),
+    ] = 1.0,
+    crease: Annotated[
+        str,
+        typer.Option(
+            "--crease",
+            metavar="DEG|off",
+            help="Keep edges whose faces turn by more than so many degrees. Line elements (l) of "
+            "an OBJ file count as creases in place of those found.",
+        ),
+    ] = "40",
+    method: Annotated[
+        Method,
+        typer.Option("--method", help="Cross field by the network, or along the curvature."),
+    ] = Method.learned,
+    field: Annotated[
+        Path | None,
+        typer.Option(
+            "--field",
+            metavar="FILE",
+            help="A cross field of your own: .ffield, .vfield, .rosy, .rawfield, .dmat, or "
+            "NeurCross .txt.",
+            show_default=False,
+        ),
+    ] = None,
+    model: ModelFile = None,
+    device: Device = "auto",
+    full_resolution: FullResolution = False,
+    no_cache: NoCache = False,
+    seed: Annotated[int, typer.Option("--seed", help="The same seed gives the same quads.")] = 0,
+    uv_out: Annotated[
+        Path | None,
+        typer.Option(
+            "--uv-out",
+            metavar="FILE",
+            help="Write the triangles with the integer-grid map as texture (.obj, for libQEx).",
+            show_default=False,
+        ),
+    ] = None,
+    json: JsonFile = None,
+    preview: Annotated[
+        Path | None,
+        typer.Option(
+            "--preview",
+            metavar="FILE",
+            help="Draw input, field and quads to a .png (needs: pip install 'vhquad[viz]').",
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Turn a triangle mesh into an all-quad mesh.
+
+    The cross field comes from the network unless --method or --field say otherwise.
+    """
+    target = mesh.with_name(f"{mesh.stem}_quads.obj") if out is None else out
+    angle = parse_crease(crease)
+    check_outputs(
+        [
+            ("--out", target, MESHES),
+            ("--uv-out", uv_out, (".obj",)),
+            ("--json", json_file(json), (".json",)),
+            ("--preview", preview, (".png",)),
+        ],
+        inputs=[mesh, field],
+    )
+    if field is not None and (model is not None or method is Method.curvature):
+        raise ConfigError("--field brings its own field; leave out --model and --method")
+    if model is not None and method is Method.curvature:
+        raise ConfigError("--method curvature uses no model; leave out --model")
+    shell: Shell = ctx.obj
+    from vhquad.cli.progress import Progress
+    from vhquad.cli.show import publish
+
+    with Progress(shell.quiet, "loading libraries") as progress:
+        from vhquad import api
+        from vhquad.mesh.io import write_quad_mesh
+        from vhquad.quad.pipeline import RemeshSettings
+
+        if preview is not None:
+            from vhquad.preview import check_viz
+
+            check_viz()
+        settings = RemeshSettings(
+            target_quads=target_quads,
+            edge_length=edge_length,
+            crease=angle,
+            adaptivity=adaptivity,
+            seed=seed,
+        )
+        seconds: dict[str, float] = {}
+        progress(f"reading {mesh}")
+        with api.clock(seconds, "read and repair"):
+            loaded = api.load(mesh)
+        progress("the cross field")
+        with api.clock(seconds, "field"):
+            if field is not None:
+                cross = api.own_field(loaded.mesh, field)
+            else:
+                cross = api.predict(
+                    loaded.mesh,
+                    model,
+                    method=method.value,
+                    resolution="full" if full_resolution else "auto",
+                    device=device,
+                    cache=not no_cache,
+                    progress=progress,
+                )
+        result = api.remesh_with(
+            loaded.mesh,
+            cross,
+            settings,
+            creases=None if angle is None else loaded.crease_edges,
+            repair_lines=loaded.lines(),
+            seconds=seconds,
+            progress=progress,
+        )
+        progress("writing")
+        write_quad_mesh(target, result.quads)
+        if uv_out is not None:
+            _write_uv(uv_out, result)
+        if preview is not None:
+            from vhquad.preview import draw_preview
+
+            progress("drawing the preview")
+            draw_preview(preview, loaded.mesh, cross, result.quads)
+    publish(shell, json, result.report, str(target))
+    _judge(loaded, result)
+
+
+def _write_uv(path: Path, result: RemeshResult) -> None:
+    from vhquad.mesh.io import write_obj_with_uv
+
+    if result.uv is None:
+        warn(f"{path} was not written: some component has no integer-grid map (see the report)")
+        return
+    write_obj_with_uv(path, result.uv.mesh, result.uv.uv)
+
+
+def _judge(loaded: LoadedMesh, result: RemeshResult) -> None:
+    """Say what fell short; leave with a code of its own if the quads are no valid mesh."""
+    report = result.report
+    for line in report.shortfalls():
+        warn(line)
+    if loaded.report.lost_components:
+        warn(f"{loaded.report.lost_components} components of the input have no area and are lost")
+    if report.quality is not None and not report.quality.is_valid:
+        raise typer.Exit(INVALID)
