@@ -34,6 +34,7 @@ def test_hits_agree_with_brute_force(case: Case, rng: np.random.Generator) -> No
     np.testing.assert_allclose(hits.barycentric.sum(axis=1), 1.0, atol=1e-14)
     np.testing.assert_allclose(hits.interpolate(m.vertices[m.faces]), hits.point, atol=1e-14)
     np.testing.assert_allclose(np.linalg.norm(hits.point - p, axis=1), hits.distance)
+    np.testing.assert_allclose(ClosestPoints(m).distance(p), hits.distance, rtol=1e-10)
 
 
 @pytest.mark.parametrize("case", EVERY, ids=str)
@@ -87,3 +88,11 @@ def test_any_triangle_however_thin(corners: tuple, query: tuple) -> None:
     u, v = u[u + v <= 1], v[u + v <= 1]
     sample = np.stack([1 - u - v, u, v], axis=1) @ c[0]
     assert distance <= np.linalg.norm(sample - p, axis=1).min() + 1e-9
+
+
+def test_triangles_without_area_do_no_harm() -> None:
+    v = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 3, 0], [0, 3, 0]]
+    tree = ClosestPoints(TriMesh(v, [[0, 1, 2], [3, 4, 3], [0, 3, 4]]))
+    points = np.array([[1.5, 1.0, 0.0], [-1.0, 3.0, 0.0], [0.0, 1.5, 2.0]])
+    np.testing.assert_allclose(tree.query(points).distance, [1.0, 1.0, 2.0])
+    np.testing.assert_allclose(tree.distance(points), [1.0, 1.0, 2.0])

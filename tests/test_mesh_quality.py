@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from tests import meshes
 from tests.data_paths import data_file
-from vhquad.mesh.distance import sample_surface, surface_distance
+from vhquad.mesh.closest import ClosestPoints
+from vhquad.mesh.distance import Distance, sample_surface, surface_distance
 from vhquad.mesh.io import read_quad_mesh
 from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.quality import check_quads, flipped_quads, scaled_jacobians
@@ -25,6 +26,10 @@ def quad(*corners: tuple[float, ...]) -> QuadMesh:
 
 def as_triangles(mesh: QuadMesh) -> TriMesh:
     return TriMesh(mesh.vertices, mesh.triangles())
+
+
+def apart(result: TriMesh, surface: TriMesh) -> Distance:
+    return surface_distance(ClosestPoints(result), ClosestPoints(surface))
 
 
 def test_scaled_jacobian_is_the_sine_of_the_corner() -> None:
@@ -105,29 +110,29 @@ def test_flipped_quads_are_named() -> None:
     surface = meshes.torus(60, 30)
     q = torus.quads.copy()
     q[[3, 50]] = q[[3, 50]][:, ::-1]
-    assert flipped_quads(torus, surface).size == 0
-    assert flipped_quads(QuadMesh(torus.vertices, q), surface).tolist() == [3, 50]
+    assert flipped_quads(torus, ClosestPoints(surface)).size == 0
+    assert flipped_quads(QuadMesh(torus.vertices, q), ClosestPoints(surface)).tolist() == [3, 50]
     # Coarse quads across the cube's edges and corners are not flipped.
     ball = meshes.quad_cube(2)
     v = ball.vertices / np.linalg.norm(ball.vertices, axis=1, keepdims=True) * 0.6
-    assert flipped_quads(QuadMesh(v, ball.quads), meshes.cube(4)).size == 0
+    assert flipped_quads(QuadMesh(v, ball.quads), ClosestPoints(meshes.cube(4))).size == 0
 
 
 def test_distance_between_shells() -> None:
     inner, outer = meshes.icosphere(4, 1.0), meshes.icosphere(4, 1.1)
-    d = surface_distance(inner, outer)
+    d = apart(inner, outer)
     gap = 100 * 0.1 / outer.diagonal
     for value in (d.hausdorff, d.to_surface_max, d.from_surface_max):
         assert value == pytest.approx(gap, rel=0.01)
     for value in (d.mean, d.to_surface_mean, d.from_surface_mean):
         assert value == pytest.approx(gap, rel=0.01)
-    assert surface_distance(inner, inner).hausdorff < 1e-12
+    assert apart(inner, inner).hausdorff < 1e-12
 
 
 def test_distance_is_taken_both_ways() -> None:
     # Half of a sheet lies on the whole sheet, but not the other way round.
     whole, half = meshes.grid(8, 6, 2.0, 1.0), meshes.grid(4, 6, 1.0, 1.0)
-    d = surface_distance(half, whole)
+    d = apart(half, whole)
     assert d.to_surface_max == pytest.approx(0.0, abs=1e-12)
     assert d.from_surface_max == pytest.approx(100 / np.sqrt(5))
     assert d.from_surface_mean == pytest.approx(100 / np.sqrt(5) / 4, rel=1e-3)

@@ -78,20 +78,27 @@ class ClosestPoints:
         MeshError
             If the points are not (q, 3) and finite.
         """
+        p, _, face = self._search(points)
+        corners = self._vertices[self._faces[face]]
+        barycentric = closest_barycentrics(corners, p)
+        point = np.einsum("qk,qki->qi", barycentric, corners)
+        return Hits(np.linalg.norm(p - point, axis=1), face, barycentric, point)
+
+    def distance(self, points: ArrayLike) -> Floats:
+        """Distance of each point from the surface, half the work of :meth:`query`; (q,)."""
+        return np.sqrt(self._search(points)[1])
+
+    def _search(self, points: ArrayLike) -> tuple[Floats, Floats, Ints]:
+        """The points as an array, their squared distances and closest faces."""
         p = np.array(points, dtype=np.float64, order="C")
         if p.ndim != 2 or p.shape[1] != 3:
             raise MeshError(f"query points must have shape (q, 3), not {p.shape}")
         if not np.isfinite(p).all():
             raise MeshError("query points must be finite")
         if len(p) == 0:
-            face = np.zeros(0, dtype=np.int64)
-        else:
-            _, face, _ = self._tree.squared_distance(self._vertices, self._faces, p)
-            face = np.asarray(face, dtype=np.int64).reshape(-1)
-        corners = self._vertices[self._faces[face]]
-        barycentric = closest_barycentrics(corners, p)
-        point = np.einsum("qk,qki->qi", barycentric, corners)
-        return Hits(np.linalg.norm(p - point, axis=1), face, barycentric, point)
+            return p, np.zeros(0), np.zeros(0, dtype=np.int64)
+        square, face, _ = self._tree.squared_distance(self._vertices, self._faces, p)
+        return p, np.asarray(square).reshape(-1), np.asarray(face, dtype=np.int64).reshape(-1)
 
 
 def closest_barycentrics(corners: Floats, points: Floats) -> Floats:

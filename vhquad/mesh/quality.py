@@ -104,8 +104,10 @@ def check_quads(mesh: QuadMesh, against: TriMesh | None = None) -> QualityReport
     length = mesh.edge_lengths if some else np.full(1, np.nan)
     distance, flipped = None, None
     if against is not None and some:
-        distance = surface_distance(TriMesh(mesh.vertices, mesh.triangles()), against)
-        flipped = len(flipped_quads(mesh, against))
+        surface = ClosestPoints(against)
+        own = ClosestPoints(TriMesh(mesh.vertices, mesh.triangles()))
+        distance = surface_distance(own, surface)
+        flipped = len(flipped_quads(mesh, surface))
     flat = np.zeros(mesh.n_quads, dtype=bool)
     flat[mesh.degenerate_quads] = True
     return QualityReport(
@@ -157,11 +159,18 @@ def scaled_jacobians(mesh: QuadMesh) -> Floats:
     return np.divide(part, whole, out=np.zeros_like(part), where=whole > 0)
 
 
-def flipped_quads(mesh: QuadMesh, surface: TriMesh) -> Ints:
+def flipped_quads(mesh: QuadMesh, surface: ClosestPoints) -> Ints:
     """Quads that face against the surface beneath them.
 
-    The normals of the surface at the points closest to the quad's middle and to four points half
-    way to its corners decide together, which spares quads across a crease.
+    The surface's normal at the point closest to the quad's middle decides; where it is more than
+    60 degrees off, so do those at four points half way to the corners, which spares quads across
+    a crease.
+
+    Parameters
+    ----------
+    mesh : QuadMesh
+    surface : ClosestPoints
+        Queries on the surface.
 
     Returns
     -------
@@ -169,10 +178,15 @@ def flipped_quads(mesh: QuadMesh, surface: TriMesh) -> Ints:
     """
     p = mesh.vertices[mesh.quads]
     middle = p.mean(axis=1)
-    points = np.concatenate([middle[:, None], 0.5 * (p + middle[:, None])], axis=1)
-    face = ClosestPoints(surface).query(points.reshape(-1, 3)).face.reshape(-1, 5)
-    beneath = surface.face_normals[face].sum(axis=1)
-    return np.flatnonzero(np.einsum("qi,qi->q", beneath, _area_vectors(mesh)) < 0)
+    normal = surface.mesh.face_normals
+    own = _area_vectors(mesh)
+    beneath = normal[surface.query(middle).face]
+    agree = np.einsum("qi,qi->q", beneath, own)
+    doubt = np.flatnonzero(agree < 0.5 * np.linalg.norm(own, axis=1))
+    around = 0.5 * (p[doubt] + middle[doubt, None])
+    face = surface.query(around.reshape(-1, 3)).face.reshape(-1, 4)
+    beneath = beneath[doubt] + normal[face].sum(axis=1)
+    return doubt[np.einsum("qi,qi->q", beneath, own[doubt]) < 0]
 
 
 def _area_vectors(mesh: QuadMesh) -> Floats:
