@@ -224,10 +224,10 @@ def write_index(dataset: Dataset) -> None:
     write_atomic(dataset.folder / "index.json", json.dumps(raw, indent=1) + "\n")
 
 
-def write_sample(folder: Path, name: str, arrays: dict[str, NDArray[Any]]) -> None:
+def write_sample(folder: Path, name: str, arrays: dict[str, Any]) -> None:
     """Write one archive; it appears whole or not at all."""
     with atomic_path(folder / "samples" / f"{name}.npz") as partial, partial.open("wb") as file:
-        np.savez(file, allow_pickle=False, **arrays)
+        np.savez(file, **arrays)
 
 
 def _entry(item: dict[str, Any]) -> SampleEntry:

@@ -156,7 +156,9 @@ def _best_length(
     tried = {m: found for m, found in errors.items() if m.startswith("curvature-aligned")}
     kept = {m: found for m, found in errors.items() if m not in tried}
     if tried:
-        best = min(tried, key=lambda m: np.mean([e.weight @ (1 - e.cosine) for _, e in tried[m]]))
+        best = min(
+            tried, key=lambda m: float(np.mean([e.weight @ (1 - e.cosine) for _, e in tried[m]]))
+        )
         kept[best] = tried[best]
     return kept
 
@@ -170,7 +172,7 @@ def _row(method: str, group: str, errors: list[_Errors]) -> EvaluationRow:
     below = np.cumsum(weight[order])
     last = len(order) - 1
     at = [min(int(np.searchsorted(below, q)), last) for q in (0.5, 0.95)]
-    median, p95 = angle[order][at].tolist()
+    median, p95 = (float(a) for a in angle[order][at])
     magnitude = magnitude_spread = None
     if all(e.relative_size is not None for e in errors):
         relative = np.concatenate([e.relative_size for e in errors if e.relative_size is not None])
