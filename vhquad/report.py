@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-import json
-import math
-import os
 import platform
-import types
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field, fields
 from importlib import metadata
-from typing import TYPE_CHECKING, Any, Union, get_args, get_origin, get_type_hints
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from vhquad import __version__
-from vhquad.atomic import write_atomic
-from vhquad.errors import ConfigError
+from vhquad.jsonable import from_plain, plain
 from vhquad.mesh.quad import QuadMesh
 
 if TYPE_CHECKING:
@@ -29,11 +22,8 @@ __all__ = [
     "FieldReport",
     "MeshCounts",
     "RemeshReport",
-    "from_plain",
-    "plain",
     "quality_shortfalls",
     "versions",
-    "write_json",
 ]
 
 COUNT_BAND = 0.10  # of the count asked for; a result farther off is a shortfall
@@ -192,7 +182,9 @@ class RemeshReport:
             If something is missing or of another kind.
         """
         known = {f.name for f in fields(cls)}
-        report: RemeshReport = from_plain(cls, {k: v for k, v in values.items() if k in known})
+        report: RemeshReport = from_plain(
+            cls, {k: v for k, v in values.items() if k in known}, _late_names()
+        )
         return report
 
 
@@ -276,70 +268,7 @@ class FieldReport:
     versions: Mapping[str, str] = field(default_factory=lambda: versions())
 
 
-# ---- JSON -----------------------------------------------------------------------------------
-
-
-def plain(value: Any) -> Any:
-    """Dataclasses, tuples, paths and numpy values as plain JSON values; NaN becomes null."""
-    if is_dataclass(value) and not isinstance(value, type):
-        return {f.name: plain(getattr(value, f.name)) for f in fields(value)}
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, list | tuple | set | frozenset):
-        return [plain(item) for item in value]
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    if value is None or isinstance(value, bool | int | float | str):
-        return value
-    return os.fspath(value) if isinstance(value, os.PathLike) else str(value)
-
-
-def from_plain(kind: Any, value: Any) -> Any:
-    """The inverse of :func:`plain`, led by type hints.
-
-    Parameters
-    ----------
-    kind : type
-        A dataclass, or what may stand in its hints: a tuple, list, mapping, optional or number.
-    value : object
-        Plain JSON values.
-
-    Raises
-    ------
-    ConfigError
-        If the value does not fit.
-    """
-    origin, inner = get_origin(kind), get_args(kind)
-    if is_dataclass(kind) and isinstance(kind, type):
-        return _dataclass_from(kind, value)
-    if origin in (Union, types.UnionType):
-        if value is None:
-            return math.nan if type(None) not in inner else None
-        return from_plain(next(k for k in inner if k is not type(None)), value)
-    if origin in (tuple, list):
-        made = [from_plain(inner[0] if inner else Any, item) for item in value]
-        return made if origin is list else tuple(made)
-    if origin is not None and issubclass(origin, Mapping):
-        key_kind, item_kind = inner
-        as_key = int if key_kind is int else str
-        return {as_key(k): from_plain(item_kind, item) for k, item in value.items()}
-    if kind is float:
-        return math.nan if value is None else float(value)
-    return value
-
-
-def _dataclass_from(kind: type, value: Any) -> Any:
-    if not isinstance(value, Mapping):
-        raise ConfigError(f"{kind.__name__}: a JSON object was expected, not {value!r}")
-    hints = get_type_hints(kind, localns=_late_names())
-    try:
-        return kind(**{name: from_plain(hints.get(name, Any), v) for name, v in value.items()})
-    except TypeError as error:
-        raise ConfigError(f"{kind.__name__} does not fit: {error}") from None
+# ---- helpers ---------------------------------------------------------------------------------
 
 
 def _late_names() -> dict[str, Any]:
@@ -347,18 +276,6 @@ def _late_names() -> dict[str, Any]:
     from vhquad.mesh.quality import QualityReport
 
     return {"QualityReport": QualityReport}
-
-
-def write_json(path: str | os.PathLike[str], value: Any) -> None:
-    """Write a report, or any value that :func:`plain` takes, as an indented JSON file, atomically.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-    """
-    content = value.to_dict() if isinstance(value, RemeshReport) else plain(value)
-    write_atomic(path, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
 
 
 def versions() -> dict[str, str]:

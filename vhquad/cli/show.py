@@ -13,14 +13,8 @@ from rich.console import Console
 from rich.table import Table
 
 from vhquad.cli.guard import Shell, complain
-from vhquad.report import (
-    CheckReport,
-    FieldReport,
-    MeshCounts,
-    RemeshReport,
-    plain,
-    write_json,
-)
+from vhquad.jsonable import plain, write_json
+from vhquad.report import CheckReport, FieldReport, MeshCounts, RemeshReport
 
 if TYPE_CHECKING:
     from vhquad.learn.dataset import Dataset
