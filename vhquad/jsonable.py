@@ -86,7 +86,7 @@ def _dataclass_from(kind: type, value: Any, late: Mapping[str, Any] | None) -> A
 
 
 def write_json(path: str | os.PathLike[str], value: Any) -> None:
-    """Write a value that knows `to_dict`, or that :func:`plain` takes, as JSON, whole or not at all.
+    """Write a value, by its `to_dict` or :func:`plain`, as indented JSON, whole or not at all.
 
     Raises
     ------
