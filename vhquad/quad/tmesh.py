@@ -33,6 +33,9 @@ class Arc:
         Nodes.
     feature : int
         Number of the feature curve it lies on, -1 for a track.
+    track : int
+        Number of the track it lies on, -1 for a feature. The arcs of a track or curve stand in the
+        order of travel.
     at : (p,) float64
         Parametric length at each point, from 0 to the length of the arc.
     points : (p, 3) float64
@@ -47,6 +50,7 @@ class Arc:
     start: int
     end: int
     feature: int
+    track: int
     at: Floats
     points: Floats
     chart: tuple[int, int, float, float]
@@ -82,6 +86,8 @@ class TMesh:
         Irregular vertices on features: corners, ends and junctions, which no polish may move.
     curves : list of (p, 3) float64
         Feature curves as polylines; a curve that closes up ends at its first point.
+    curve_halfedges : list of (p - 1,) int64
+        The same curves as halfedges of the mesh, each with its face to the left.
     arcs, patches : list
     """
 
@@ -90,6 +96,7 @@ class TMesh:
     node_feature: NDArray[np.int64]
     node_fixed: NDArray[np.bool_]
     curves: list[Floats]
+    curve_halfedges: list[NDArray[np.int64]]
     arcs: list[Arc]
     patches: list[Patch]
 
@@ -206,6 +213,7 @@ def build_tmesh(aligned: AlignedField, seamless: SeamlessMap, tracing: Tracing) 
         node_feature=node_feature,
         node_fixed=(node_feature >= 0) & (node_vertex >= 0) & irregular[node_vertex],
         curves=[b.mesh.vertices[np.append(b.mesh.tail[c], b.mesh.head[c[-1]])] for c in curves],
+        curve_halfedges=[np.array(c, dtype=np.int64) for c in curves],
         arcs=b.arcs,
         patches=patches,
     )
@@ -300,7 +308,7 @@ def _cut_track(
         else _exit_coordinate(b, step.face, step.direction, step.level, step.at)
     )
     charts.append(_chart(step.face, step.direction, step.level, last))
-    made = _make_arcs(b, nodes, places, charts, charts, at, points, -1)
+    made = _make_arcs(b, nodes, places, charts, charts, at, points, track=number)
     first_half[("track", number, 0)] = 2 * made[0]
     first_half[("track", number, -1)] = 2 * made[-1] + 1
     hit = track.hit
@@ -330,7 +338,8 @@ def _make_arcs(
     back_charts: list[tuple[int, int, float, float]],
     at: Floats,
     points: Floats,
-    feature: int,
+    feature: int = -1,
+    track: int = -1,
 ) -> list[int]:
     """Cut a polyline at its nodes; numbers of the arcs made."""
     made = []
@@ -348,6 +357,7 @@ def _make_arcs(
                 start=nodes[i],
                 end=nodes[i + 1],
                 feature=feature,
+                track=track,
                 at=(where - low) * b.unit,
                 points=polyline,
                 chart=charts[i],
@@ -440,7 +450,7 @@ def _cut_curve(
     places.append(float(at[-1]))
     charts.append(chart(len(curve) - 1, 1.0))
     back.append(back_chart(len(curve) - 1, 1.0))
-    made = _make_arcs(b, nodes, places, charts, back, at, points, number)
+    made = _make_arcs(b, nodes, places, charts, back, at, points, feature=number)
     closed = int(mesh.twin[curve[0]]) < 0
     first_half[("feature", curve[0])] = 2 * made[0]
     if closed:
