@@ -17,7 +17,7 @@ from scipy.sparse.linalg import splu
 from vhquad.field.dual import carry4, dirichlet, dual_weights
 from vhquad.mesh.triangle import TriMesh
 
-__all__ = ["factorized", "polish", "smoothest"]
+__all__ = ["factorized", "polish", "relaxed", "smoothest", "unit"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -45,7 +45,14 @@ def smoothest(mesh: TriMesh, seed: int = 0) -> Complexes:
 def polish(
     mesh: TriMesh, target: Complexes, weight: Floats, fixed: NDArray[np.bool_] | None = None
 ) -> Complexes:
-    """Minimise Dirichlet energy + sum over faces of ``weight |z - target|^2``; unit crosses (m,).
+    """The unit crosses of :func:`relaxed`; (m,) complex128."""
+    return unit(relaxed(mesh, target, weight, fixed))
+
+
+def relaxed(
+    mesh: TriMesh, target: Complexes, weight: Floats, fixed: NDArray[np.bool_] | None = None
+) -> Complexes:
+    """Minimise Dirichlet energy + sum over faces of ``weight |z - target|^2``; (m,) complex128.
 
     Parameters
     ----------
@@ -60,7 +67,8 @@ def polish(
 
     Notes
     -----
-    A component without weights or fixed faces gets its smoothest field.
+    A component without weights or fixed faces gets its smoothest field. The modulus says how much
+    the target has to say at a face: it falls where weights are small or neighbours disagree.
     """
     fixed = np.zeros(mesh.n_faces, dtype=bool) if fixed is None else fixed
     component = mesh.face_component
@@ -77,7 +85,7 @@ def polish(
         matrix = rows[:, free] + diags(weight[free])
         pull = weight[free] * target[free] - rows @ np.where(fixed, target, 0.0)
         z[free] = factorized(matrix)(pull)
-    return unit(z)
+    return z
 
 
 def unit(z: Complexes) -> Complexes:
