@@ -128,7 +128,7 @@ def test_obj_errors_name_the_line(text: str, say: str) -> None:
 
 def test_off_of_several_styles() -> None:
     body = "0 0 0 9\n1 0 0 9\n\n1 1 0 9 # last\n3 0 1 2 255 0 0\n3 2 1 0\n"
-    for head in ("OFF\n# a remark\n3 2 0\n", "OFF 3 2 0\n", "COFF\n3 2 0\n", "3 2 0\n"):
+    for head in ("OFF\n# a remark\n3 2 0\n", "OFF 3 2 0\n", "NCOFF\n3 2 0\n", "3 2 0\n"):
         soup = parse_off(head + body)
         assert soup.faces == [[0, 1, 2], [2, 1, 0]]
         np.testing.assert_array_equal(soup.vertices, [[0, 0, 0], [1, 0, 0], [1, 1, 0]])

@@ -136,9 +136,10 @@ def _cut_caps(
     # All (cap, face beside it) pairs: halfedges with the key of a cap's long side.
     long_key = key[bad, side]
     order = np.argsort(long_key, kind="stable")
-    touching = np.flatnonzero(np.isin(key.reshape(-1), long_key))
-    low = np.searchsorted(long_key[order], key.reshape(-1)[touching], "left")
-    high = np.searchsorted(long_key[order], key.reshape(-1)[touching], "right")
+    low = np.searchsorted(long_key[order], key.reshape(-1), "left")
+    high = np.searchsorted(long_key[order], key.reshape(-1), "right")
+    touching = np.flatnonzero(low < high)
+    low, high = low[touching], high[touching]
     cap = order[np.repeat(low, high - low) + _ramp(high - low)]
     beside = np.repeat(touching, high - low)
     other = beside // 3 != bad[cap]

@@ -69,7 +69,9 @@ def glue(points: Floats, faces: Ints, weld: Ints) -> Gluing:
     order = np.lexsort((own, key))
     two, many = _runs(key[order])
     twice, _ = _runs(own[order])
-    apart = ~np.isin(order[twice], order[two])
+    plain = np.zeros(3 * m, dtype=bool)
+    plain[order[two]] = True
+    apart = ~plain[order[twice]]
     pairs = [order[np.stack([two, two + 1], axis=1)]]
     own_pairs = order[np.stack([twice[apart], twice[apart] + 1], axis=1)]
     same_own = own[pairs[0][:, 0]] == own[pairs[0][:, 1]]

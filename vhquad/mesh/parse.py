@@ -95,7 +95,7 @@ def _references(
 
 
 def parse_off(text: str) -> PolygonSoup:
-    """Polygons of an OFF text, also with colours or normals behind the positions (COFF, NOFF).
+    """Polygons of an OFF text; colours and normals behind the positions are left aside.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def parse_off(text: str) -> PolygonSoup:
     """
     rows = [(i, line.split("#")[0].split()) for i, line in enumerate(text.splitlines())]
     rows = [(i, row) for i, row in rows if row]
-    if rows and re.fullmatch(r"(ST)?C?N?OFF", rows[0][1][0]):
+    if rows and re.fullmatch(r"(ST|C|N)*OFF", rows[0][1][0]):
         rows[0] = (rows[0][0], rows[0][1][1:])
         rows = rows if rows[0][1] else rows[1:]
     elif rows and rows[0][1][0].endswith("OFF"):

@@ -101,6 +101,8 @@ def _edge_keys(soup: PolygonSoup) -> Ints:
 
 def _cut_quads(soup: PolygonSoup, quads: Ints) -> Ints:
     """Two triangles a quad; (2 j, 3)."""
+    if len(quads) == 0:
+        return np.zeros((0, 3), dtype=np.int64)
     p = soup.vertices[quads]
     with np.errstate(invalid="ignore", over="ignore"):
         normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
@@ -117,18 +119,24 @@ def _cut_quads(soup: PolygonSoup, quads: Ints) -> Ints:
     n = np.int64(len(soup.vertices))
     low, high = np.minimum(quads, np.roll(quads, 2, 1)), np.maximum(quads, np.roll(quads, 2, 1))
     key = (low * n + high)[:, :2]  # of diagonals 0-2 and 1-3
-    taken = np.isin(key, _edge_keys(soup))
+    taken = _among(key, np.sort(_edge_keys(soup)))
     for _ in range(3):  # the few that clash change over, which may clash once more
         chosen = np.where(first, key[:, 0], key[:, 1])
         _, inverse, count = np.unique(chosen, return_inverse=True, return_counts=True)
         clash = (count[inverse] > 1) | np.where(first, taken[:, 0], taken[:, 1])
         other = np.where(first, key[:, 1], key[:, 0])
-        free = ~np.where(first, taken[:, 1], taken[:, 0]) & ~np.isin(other, chosen)
+        free = ~np.where(first, taken[:, 1], taken[:, 0]) & ~_among(other, np.sort(chosen))
         if not (clash & free).any():
             break
         first = np.where(clash & free, ~first, first)
     cut = np.where(first[:, None], [0, 1, 2, 0, 2, 3], [0, 1, 3, 1, 2, 3])
     return np.take_along_axis(quads, cut, axis=1).reshape(-1, 3)
+
+
+def _among(values: Ints, ordered: Ints) -> NDArray[np.bool_]:
+    """Whether each value is one of a sorted array."""
+    place = np.searchsorted(ordered, values).clip(max=len(ordered) - 1)
+    return np.asarray(ordered[place] == values)
 
 
 def _clip_ears(p: Floats) -> Ints:

@@ -259,8 +259,10 @@ def _checked(vertices: ArrayLike, faces: ArrayLike) -> tuple[Floats, Ints]:
             f"{len(bad)} faces use vertices that are NaN or infinite, the first is vertex"
             f" {corners[wrong[corners]][0]} of face {bad[0]}; delete them or export again"
         )
-    size = float(np.ptp(v[f].reshape(-1, 3), axis=0).max())
-    if not (np.abs(v[f]).max() < 1e100 and (size == 0 or size > 1e-100)):
+    corners = v[f].reshape(-1, 3)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    size = float((high - low).max())
+    if not (max(np.abs(low).max(), np.abs(high).max()) < 1e100 and (size == 0 or size > 1e-100)):
         raise MeshError("coordinates are beyond 1e100 or all within 1e-100; rescale the mesh")
     return v, f
 
