@@ -49,7 +49,8 @@ class SeamlessSpace:
         Common denominator; a power of two in all known cases.
     even : (d,) bool
         Unknowns on which the place of an isoline through a special vertex or along a feature
-        depends; the others move ordinary vertices only (see ``vhquad.quad.seamless_map.snap``).
+        depends, translations across the cut included; the others move ordinary vertices only (see
+        ``vhquad.quad.seamless_map``).
     """
 
     wedge: Ints
@@ -78,14 +79,16 @@ def seamless_space(aligned: AlignedField) -> SeamlessSpace:
     wedge = _wedges(aligned, cut)
     segments = _segments(aligned, cut)
     links = _scalar_links(aligned, turns, rotation, wedge, segments)
-    basis, denominator, linked = _eliminate(2 * (int(wedge.max()) + 1), 2 * len(segments), links)
+    basis, denominator, linked, shifts = _eliminate(
+        2 * (int(wedge.max()) + 1), 2 * len(segments), links
+    )
 
     special = np.zeros(basis.shape[0], dtype=bool)
     corner_special = special_vertices(aligned)[mesh.faces]
     for axis in (0, 1):
         special[2 * wedge[corner_special] + axis] = True
     rows = basis[special | linked]
-    even = np.asarray(np.abs(rows).sum(axis=0)).ravel() > 0
+    even = shifts | (np.asarray(np.abs(rows).sum(axis=0)).ravel() > 0)
     return SeamlessSpace(
         wedge=wedge,
         rotation=rotation,
@@ -285,8 +288,9 @@ _Row = dict[int, Fraction]
 
 def _eliminate(
     n_scalars: int, n_shifts: int, links: list[_Link]
-) -> tuple[csr_matrix, int, NDArray[np.bool_]]:
-    """Basis of all scalars that satisfy the links, its denominator, and roots of feature links."""
+) -> tuple[csr_matrix, int, NDArray[np.bool_], NDArray[np.bool_]]:
+    """Basis of all scalars that satisfy the links, its denominator, scalars that features link,
+    and which unknowns of the basis are shifts."""
     adjacency: dict[int, list[int]] = {}
     for number, (a, b, _, _) in enumerate(links):
         adjacency.setdefault(a, []).append(number)
@@ -362,7 +366,7 @@ def _eliminate(
     )
     used, packed = np.unique(col_index, return_inverse=True)
     basis = csr_matrix((entry, (row_index, packed)), shape=(n_scalars, len(used)))
-    return basis, denominator, plain
+    return basis, denominator, plain, used >= n_scalars
 
 
 def _plus(row: dict[int, int], key: int, amount: int) -> dict[int, int]:
