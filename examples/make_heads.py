@@ -30,11 +30,13 @@ from anny.face_segmentation import get_face_segmentation_mask
 from numpy.typing import NDArray
 
 from vhquad.learn.subdivide import catmull_clark
+from vhquad.learn.targets import isotropic_remesh, split_quads
 
 HEAD_PARTS = re.compile(r"^(head|forehead|eyebrows|mouth|nose|chin|neck|(l|r)-(eye|ear|cheek))-")
 SIDES = (("l-", "r-"), ("Left", "Right"))
 MOST_SELF_INTERSECTIONS = 150  # triangles
 SCAN_IDENTITY = 1_000_000  # never reached by --count
+SCAN_VERTICES = 13_000
 
 
 class HeadMaker:
@@ -103,9 +105,9 @@ def self_intersections(vertices: NDArray[np.float64], quads: NDArray[np.int64]) 
 
 
 def write_obj(path: Path, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
-    """Write positions (six digits) and faces; the file appears whole or not at all."""
+    """Write positions (seven decimals) and faces; the file appears whole or not at all."""
     lines = ["# random head, anny (MakeHuman shapes), CC0 1.0"]
-    lines += [f"v {x:.6g} {y:.6g} {z:.6g}" for x, y, z in vertices]
+    lines += [f"v {x:.7f} {y:.7f} {z:.7f}" for x, y, z in vertices]
     lines += ["f " + " ".join(map(str, face)) for face in (faces + 1).tolist()]
     partial = path.with_suffix(".partial")
     partial.write_text("\n".join(lines) + "\n", encoding="ascii")
@@ -132,15 +134,9 @@ def make_scan(path: Path, seed: int) -> None:
     """One head that no training set of this script holds, as triangles that hide its quads."""
     vertices, quads, _ = HeadMaker(seed).draw(SCAN_IDENTITY, skin_only=False)
     fine = catmull_clark(vertices, quads)
-    triangles = np.concatenate([fine.quads[:, [0, 1, 2]], fine.quads[:, [0, 2, 3]]])
-    meshes = pymeshlab.MeshSet(verbose=False)
-    meshes.add_mesh(pymeshlab.Mesh(fine.vertices, triangles.astype(np.int32)))
-    for _ in range(3):
-        meshes.meshing_isotropic_explicit_remeshing(
-            iterations=6, targetlen=pymeshlab.PercentageValue(0.72)
-        )
-    mesh = meshes.current_mesh()
-    write_obj(path, mesh.vertex_matrix(), mesh.face_matrix().astype(np.int64))
+    triangles, _, _ = split_quads(fine.quads, np.random.default_rng(seed))
+    mesh = isotropic_remesh(fine.vertices, triangles, SCAN_VERTICES)
+    write_obj(path, 10.0 * mesh.vertices, mesh.faces)  # decimetres
 
 
 def main() -> None:

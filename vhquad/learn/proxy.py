@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import fast_simplification
 import numpy as np
 
-from vhquad.errors import MeshError
 from vhquad.field.cross import CrossField
 from vhquad.geometry.frames import build_frames, face_axes, from_3d, to_3d, vertex_axes
 from vhquad.mesh.closest import ClosestPoints
+from vhquad.mesh.proxy import decimate
 from vhquad.mesh.triangle import TriMesh
 
 __all__ = ["carry_back", "make_proxy"]
@@ -26,27 +25,18 @@ def make_proxy(mesh: TriMesh, n_vertices: int) -> TriMesh | None:
     Returns
     -------
     TriMesh or None
-        None where decimation breaks the surface (another topology, not manifold): the caller then
-        uses the mesh itself.
+        None where there is nothing to decimate or another topology comes out: the caller then uses
+        the mesh itself.
     """
-    share = 1.0 - n_vertices / mesh.n_vertices
-    if share <= 0.0:
+    if n_vertices >= mesh.n_vertices:
         return None
-    vertices, faces = fast_simplification.simplify(
-        mesh.vertices.astype(np.float64), mesh.faces.astype(np.int32), target_reduction=share
+    proxy = decimate(mesh, round(mesh.n_faces * n_vertices / mesh.n_vertices))
+    same = (
+        proxy.n_vertices < mesh.n_vertices
+        and proxy.euler_characteristic == mesh.euler_characteristic
+        and len(proxy.boundary_loops) == len(mesh.boundary_loops)
     )
-    faces = faces[(np.diff(np.sort(faces, axis=1), axis=1) > 0).all(axis=1)]
-    if len(faces) == 0:
-        return None
-    used, local = np.unique(faces, return_inverse=True)
-    proxy = TriMesh(vertices[used], local.reshape(-1, 3).astype(np.int64))
-    try:
-        sound = proxy.has_manifold_vertices and proxy.n_components == 1
-        same = proxy.euler_characteristic == mesh.euler_characteristic
-        same = same and len(proxy.boundary_loops) == len(mesh.boundary_loops)
-    except MeshError:
-        return None
-    return proxy if sound and same and proxy.face_areas.min() > 0 else None
+    return proxy if same else None
 
 
 def carry_back(proxy: TriMesh, field: CrossField, mesh: TriMesh) -> CrossField:

@@ -41,13 +41,17 @@ class Record:
 
 
 class RunState:
-    """Network, optimiser, averaged network and step count; changed in place by the trainer."""
+    """Network, optimiser, averaged network and step count; changed in place by the trainer.
+
+    ``changing`` is True while weights are half updated: what an interrupt then leaves is no state.
+    """
 
     def __init__(
         self, network: VectorHeatNet, averaged: VectorHeatNet, settings: TrainSettings, step: int
     ) -> None:
         self.network, self.averaged = network, averaged.eval()
         self.settings, self.step = settings, step
+        self.changing = False  # while a step is half done
         self.optimizer = torch.optim.AdamW(
             network.parameters(), lr=settings.rate, weight_decay=settings.weight_decay
         )

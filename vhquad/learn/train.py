@@ -131,7 +131,8 @@ def train(
             if state.step % state.settings.save_every == 0 or state.step == end:
                 _save(folder, state, log, last)
     except KeyboardInterrupt:
-        _save(folder, state, log, last)
+        if not state.changing:  # else the last checkpoint stands
+            _save(folder, state, log, last)
         raise
     return TrainResult(folder / "model.safetensors", state.step, last, time.monotonic() - start)
 
@@ -208,10 +209,12 @@ def _step(state: RunState, items: list[Item], device: torch.device) -> Record:
     state.optimizer.zero_grad(set_to_none=True)
     loss.total.backward()
     norm = torch.nn.utils.clip_grad_norm_(state.network.parameters(), settings.clip)
+    state.changing = True
     if bool(torch.isfinite(norm)):
         state.optimizer.step()
         state.average()
     state.step += 1
+    state.changing = False
     return Record(
         step=state.step,
         split="train",
