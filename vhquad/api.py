@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vhquad.errors import ConfigError, FieldError, MeshError
+from vhquad.field.baseline import curvature_field
 from vhquad.field.cross import CrossField
 from vhquad.field.io import read_field
 from vhquad.field.singular import find_singularities
@@ -45,8 +46,6 @@ __all__ = [
 Method = Literal["learned", "curvature"]
 Progress = Callable[[str, float], None]
 
-CURVATURE_LENGTH = 0.05  # detail below this share of the area's square root is smoothed away
-
 
 def predict(
     mesh: TriMesh,
@@ -58,7 +57,7 @@ def predict(
     cache: bool = True,
     progress: Progress | None = None,
 ) -> CrossField:
-    """A cross at every vertex of a mesh, with the size of the quads wanted there.
+    """A cross at every vertex or face of a mesh, with the size of the quads wanted there.
 
     Parameters
     ----------
@@ -81,7 +80,7 @@ def predict(
     Returns
     -------
     CrossField
-        On vertices.
+        On vertices if predicted, on faces along the curvature.
 
     Raises
     ------
@@ -93,9 +92,7 @@ def predict(
     if method == "curvature":
         if model is not None:
             raise ConfigError("a model was given, but the method curvature uses none")
-        from vhquad.learn.baselines import curvature_aligned
-
-        return curvature_aligned(mesh, (CURVATURE_LENGTH,))[0]
+        return curvature_field(mesh)
     from vhquad.learn.predict import predict_field
 
     def on_component(done: int, count: int) -> None:
