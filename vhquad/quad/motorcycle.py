@@ -48,7 +48,7 @@ class Hit:
     kind "track": ``other`` is the track, ``step`` its step and ``coordinate`` the place on it.
     kind "feature": ``other`` is the halfedge and ``coordinate`` the fraction along it.
     kind "meet": ``other`` is the track that came the opposite way.
-    ``direction`` is that of arrival, in the chart of the face.
+    ``direction`` is that of arrival, in the chart of the face (of the other track, head-on).
     """
 
     kind: str
@@ -247,7 +247,8 @@ def _advance(
         met = tracks[other].steps[index]
         if met.level == level and met.direction == (direction + 2) % 4 and met.stop is None:
             track.hit = Hit("meet", other, index, 0.0, direction)
-            tracks[other].hit = Hit("meet", number, len(track.steps) - 1, 0.0, step.direction)
+            back = (step.direction + 2) % 4
+            tracks[other].hit = Hit("meet", number, len(track.steps) - 1, 0.0, back)
             tracks[other].length += abs(_exit(charts, met)[2] - met.at)
             return False
     axis = direction % 2
