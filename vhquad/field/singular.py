@@ -27,11 +27,14 @@ class Singularities:
         Four times the index: 1 makes a vertex of three quads, -1 one of five.
     euler_characteristic : int
         Of the mesh; the indices of a closed mesh sum to it, the boundary takes the rest.
+    boundary_quarters : int
+        Four times what the boundary takes: two less the quads at each of its vertices, summed.
     """
 
     vertex: NDArray[np.int64]
     quarters: NDArray[np.int64]
     euler_characteristic: int
+    boundary_quarters: int = 0
 
     def __len__(self) -> int:
         return len(self.vertex)
@@ -63,8 +66,10 @@ def find_singularities(mesh: TriMesh, field: CrossField) -> Singularities:
     border = mesh.twin < 0
     matched = match_field(mesh, crosses.angle, border, np.zeros(3 * mesh.n_faces))
     singular = np.flatnonzero(matched.sector_is_singular & ~matched.sector_is_feature)
+    rim = matched.sector_is_feature
     return Singularities(
         vertex=matched.sector_vertex[singular],
         quarters=4 - matched.sector_quads[singular],
         euler_characteristic=mesh.euler_characteristic,
+        boundary_quarters=int((2 - matched.sector_quads[rim]).sum()),
     )

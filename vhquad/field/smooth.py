@@ -22,7 +22,7 @@ __all__ = ["factorized", "polish", "relaxed", "smoothest", "unit"]
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-INVERSE_ITERATIONS = 12
+INVERSE_ITERATIONS = 20
 
 
 def smoothest(mesh: TriMesh, seed: int = 0) -> Complexes:
