@@ -21,6 +21,7 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile("vhquad")
+torch.set_num_threads(1)  # small meshes; more threads wait for each other
 
 
 @pytest.fixture

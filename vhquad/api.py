@@ -24,7 +24,7 @@ from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.quality import check_quads
 from vhquad.mesh.repair import repair
 from vhquad.mesh.triangle import TriMesh
-from vhquad.quad.pipeline import RemeshResult, RemeshSettings, remesh_mesh
+from vhquad.quad.pipeline import SIZE_RANGE, RemeshResult, RemeshSettings, remesh_mesh
 from vhquad.report import CheckReport, FieldReport, MeshCounts
 
 if TYPE_CHECKING:
@@ -265,6 +265,8 @@ def describe_field(
                 "median": float(np.median(values)),
                 "largest": float(values.max()),
             }
+            middle = float(np.median(values))
+            values = np.clip(values, middle / SIZE_RANGE, middle * SIZE_RANGE)
             quads = round(float((area[known] / values**2).sum()))
     return FieldReport(
         input=MeshCounts.of(mesh),

@@ -162,7 +162,7 @@ class RemeshReport:
         for number, part in enumerate(self.components):
             if part.reason:
                 where = f"component {number}: " if len(self.components) > 1 else ""
-                lines.append(f"{where}{part.method} was used: {part.reason}")
+                lines.append(f"{where}fallback used ({part.method}), because {part.reason}")
         return tuple(lines)
 
     def to_dict(self) -> dict[str, Any]:
@@ -253,6 +253,8 @@ class FieldReport:
         "least", "median" and "largest" edge length of the quads wanted, in units of the mesh.
     quads : int or None
         Quads that these sizes amount to.
+    lost : str
+        What the file's format does not keep.
     repair : tuple of str
     seconds : dict of str to float
     versions : dict of str to str
@@ -263,6 +265,7 @@ class FieldReport:
     index_sum: float
     size: Mapping[str, float] | None = None
     quads: int | None = None
+    lost: str = ""
     repair: tuple[str, ...] = ()
     seconds: Mapping[str, float] = field(default_factory=dict)
     versions: Mapping[str, str] = field(default_factory=lambda: versions())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -67,7 +68,7 @@ def predict(
 
     with Progress(shell.quiet, "loading libraries") as progress:
         from vhquad import api
-        from vhquad.field.io import write_field
+        from vhquad.field.io import FORMAT_LOSSES, write_field
         from vhquad.mesh.io import write_triangle_mesh
 
         seconds: dict[str, float] = {}
@@ -90,6 +91,7 @@ def predict(
             if mesh_out is not None:
                 write_triangle_mesh(mesh_out, loaded.mesh)
         report = api.describe_field(loaded.mesh, field, loaded.lines(), seconds)
+        report = replace(report, lost=FORMAT_LOSSES[target.suffix.lower()])
     if loaded.report.changed and mesh_out is None:
         warn(
             f"{mesh} was repaired, and the field has a row for each element of the repaired mesh; "

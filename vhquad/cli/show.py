@@ -94,6 +94,8 @@ def _remesh_table(report: RemeshReport, target: str | None) -> Table:
     for method in dict.fromkeys(methods):
         share = f"  ({methods.count(method)} components)" if len(methods) > 1 else ""
         table.add_row("made by", f"{method}{share}")
+    for reason in dict.fromkeys(part.reason for part in report.fallbacks):
+        table.add_row("  because", reason)
     _seconds_rows(table, report.seconds)
     return table
 
@@ -123,6 +125,8 @@ def _field_table(report: FieldReport, target: str | None) -> Table:
         table.add_row("quad edge length", f"{low:.4g} to {high:.4g}, median {middle:.4g}")
     if report.quads is not None:
         table.add_row("quads these sizes make", f"{report.quads:,}")
+    if report.lost:
+        table.add_row("this format", report.lost)
     _seconds_rows(table, report.seconds)
     return table
 

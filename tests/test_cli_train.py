@@ -1,0 +1,65 @@
+"""`vhquad preprocess` and `vhquad train`: from a folder of quads to a model that predicts."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.command_line import Invoke, write_obj
+from tests.meshes import half_sphere, icosphere
+from tests.quad_meshes import cube_sphere, quad_torus
+
+SMALL = ("--vertices", "250", "350", "--triangulations", "1", "--k", "16", "--val", "0")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Two quad meshes, a plain triangle mesh and rubbish."""
+    path = tmp_path / "quads"
+    path.mkdir()
+    write_obj(path / "torus.obj", *quad_torus())
+    write_obj(path / "ball.obj", *cube_sphere())
+    plain = half_sphere(2)
+    write_obj(path / "plain.obj", plain.vertices, plain.faces)
+    (path / "rubbish.obj").write_text("no mesh", encoding="ascii")
+    return path
+
+
+def test_quads_to_model_to_field(invoke: Invoke, folder: Path, tmp_path: Path) -> None:
+    """The whole way, by default names; what cannot be used is named; training resumes."""
+    run = invoke("preprocess", folder, *SMALL, "--jobs", "1")
+    assert run.code == 0
+    assert "rubbish.obj" in run.err
+    dataset = tmp_path / "quads_dataset"
+    index = json.loads((dataset / "index.json").read_text(encoding="utf-8"))
+    assert len(index["samples"]) == 3
+
+    first = invoke("train", dataset, "--steps", "2", "--preset", "starter", "--seed", "1")
+    assert first.code == 0
+    run_folder = tmp_path / "quads_dataset_run"
+    assert (run_folder / "model.safetensors").exists()
+    assert invoke("train", dataset, "--steps", "2").refused("--resume")
+    again = invoke("train", dataset, "--resume")
+    assert again.code == 0
+
+    ball = icosphere(2)
+    source = write_obj(tmp_path / "ball.obj", ball.vertices, ball.faces)
+    assert invoke("predict", source, "--model", run_folder).code == 0
+    assert source.with_suffix(".ffield").exists()
+
+
+def test_refusals(invoke: Invoke, tmp_path: Path) -> None:
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    assert invoke("preprocess", empty).refused("empty", "no mesh")
+    assert invoke("preprocess", tmp_path / "no").refused("no")
+    assert invoke("preprocess", empty, "--out", empty).refused("--out")
+    assert invoke("preprocess", empty, "--val", "2").refused("--val")
+    assert invoke("train", empty).refused("vhquad preprocess")
+    assert invoke("train", empty, "--steps", "1", "--epochs", "1").refused("--steps or --epochs")
+    assert invoke("train", empty, "--init", "default", "--preset", "paper").refused("--init")
+    assert invoke("train", empty, "--preset", "huge").refused("huge", "starter")
+    assert invoke("train", empty, "--resume", "--rate", "1").refused("--resume", "--rate")
+    assert invoke("train").code == 2
