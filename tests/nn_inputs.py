@@ -68,5 +68,5 @@ def answer(network: VectorHeatNet, mesh: NetworkInput) -> tuple[Complexes, NDArr
 
 
 def from_halfedges(z: Complexes, mesh: TriMesh, order: int) -> Complexes:
-    """The field at the tail of each halfedge, measured from that halfedge: free of frames; (3m,)."""
+    """The field at each halfedge's tail, measured from that halfedge: free of frames; (3m,)."""
     return np.asarray(z[mesh.tail] * np.exp(-1j * order * build_frames(mesh).halfedge_angle))

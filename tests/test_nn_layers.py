@@ -110,7 +110,7 @@ def test_mixed_head_starts_as_the_papers() -> None:
 
 
 def test_bfloat16_products_are_near() -> None:
-    """9. The training precision gives the same field to within a few degrees of 4 times the angle."""
+    """9. The training precision gives nearly the same field."""
     network = random_network(small_settings(), torch.float32)
     given = as_input(blob_operators(), torch.float32)
     with torch.no_grad():

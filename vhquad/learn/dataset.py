@@ -53,6 +53,11 @@ __all__ = [
     "write_sample",
 ]
 
+ARRAYS = (
+    "vertices", "faces", "mass", "eigenvalues", "eigenvectors", "features",
+    "z", "size", "coherence",
+)  # fmt: skip
+PER_VERTEX = frozenset(ARRAYS) - {"faces", "eigenvalues"}
 FORMAT, VERSION = "vhquad-dataset", 1
 Split = Literal["train", "val", "test"]
 
@@ -123,7 +128,7 @@ class Dataset:
         DatasetError
             If its file is missing, damaged or lacks an array.
         """
-        return _read(self.folder, entry, None)
+        return _read(self.folder, entry, ARRAYS if entry.truth else ARRAYS[:6])
 
     def mesh(self, entry: SampleEntry) -> TriMesh:
         """Its triangle mesh."""
@@ -239,14 +244,18 @@ def _entry(item: dict[str, Any]) -> SampleEntry:
     return entry
 
 
-def _read(folder: Path, entry: SampleEntry, names: Sequence[str] | None) -> dict[str, NDArray[Any]]:
+def _read(folder: Path, entry: SampleEntry, names: Sequence[str]) -> dict[str, NDArray[Any]]:
     path = folder / "samples" / f"{entry.name}.npz"
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in names or archive.files}
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in names}
     except Exception as error:  # zipfile, zlib and numpy raise a dozen kinds
         raise DatasetError(f"sample {path} cannot be read: {error}; preprocess again") from None
     for name, value in arrays.items():
-        if name != "faces" and not np.isfinite(value).all():
-            raise DatasetError(f"sample {path}: {name} holds NaN or infinite values")
+        if value.dtype.kind not in "iufc" or not np.isfinite(value).all():
+            raise DatasetError(f"sample {path}: {name} holds NaN or infinite values, or no numbers")
+        if name in PER_VERTEX and len(value) != entry.vertices:
+            raise DatasetError(
+                f"sample {path}: {name} has {len(value)} rows for {entry.vertices} vertices"
+            )
     return arrays

@@ -8,6 +8,7 @@ all vertices, weighted likewise, as in the paper's table. A random field scores 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -194,4 +195,4 @@ def _row(method: str, group: str, errors: list[_Errors]) -> EvaluationRow:
 
 def _moments(values: Floats, weight: Floats) -> tuple[float, float]:
     mean = float(weight @ values)
-    return mean, float(np.sqrt(max(0.0, weight @ (values - mean) ** 2)))
+    return mean, math.sqrt(float(weight @ (values - mean) ** 2))

@@ -15,78 +15,26 @@ import multiprocessing
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
-from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vhquad.errors import ConfigError, DatasetError, VhquadError
-from vhquad.field.cross import CrossField
-from vhquad.geometry.operators import OperatorSettings, build_operators
-from vhquad.learn.augment import crop_height, deform, mirror
+from vhquad.errors import DatasetError, VhquadError
 from vhquad.learn.dataset import Dataset, SampleEntry, Split, write_index, write_sample
+from vhquad.learn.samples import (
+    PreprocessSettings,
+    make_sample,
+    operator_arrays,
+    operator_settings,
+    truth_arrays,
+)
 from vhquad.learn.sources import Part, read_source
-from vhquad.learn.targets import leak, make_target
-from vhquad.mesh.triangle import TriMesh
+from vhquad.learn.targets import leak
 
 __all__ = ["PreprocessSettings", "preprocess"]
 
 MESH_SUFFIXES = (".obj", ".ply", ".off", ".stl", ".glb")
 REVISION = 1  # raise when samples made by older code are no longer good
-
-
-@dataclass(frozen=True)
-class PreprocessSettings:
-    """How samples are made.
-
-    Attributes
-    ----------
-    triangulations : int
-        Samples a quad mesh. The first is the whole shape as it is; the others may be varied.
-    vertices : (int, int)
-        Range of the vertex count of a sample made from quads, drawn log-uniformly.
-    crops : float
-        Share of the further samples that are cropped.
-    deform : float
-        Share of the further samples that are deformed and perhaps mirrored.
-    val, test : float
-        Share of the shapes put aside; ``split.json`` in the folder ({"shape": "test", ...}) goes
-        first. A shape is named by its path in the folder without suffix, "-" between the folders,
-        up to a double underscore.
-    features : str
-        Input features of the network.
-    turned : bool
-        With copies of the features turned by a right angle.
-    k : int
-        Eigenvectors.
-    seed : int
-    """
-
-    triangulations: int = 2
-    vertices: tuple[int, int] = (2000, 4000)
-    crops: float = 0.75
-    deform: float = 0.0
-    val: float = 0.1
-    test: float = 0.0
-    features: str = "hks"
-    turned: bool = True
-    k: int = 128
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        if self.triangulations < 1:
-            raise ConfigError(f"--triangulations must be at least 1, not {self.triangulations}")
-        low, high = self.vertices
-        if not 100 <= low <= high:
-            raise ConfigError(f"--vertices must be a range from 100 up, not {low} to {high}")
-        for name in ("crops", "deform", "val", "test"):
-            value = getattr(self, name)
-            if not 0.0 <= value <= 1.0:
-                raise ConfigError(f"--{name} must lie between 0 and 1, not {value}")
-        if self.k < 1:
-            raise ConfigError(f"--k must be at least 1, not {self.k}")
 
 
 @dataclass(frozen=True)
@@ -261,17 +209,17 @@ def _sample(job: _Job, part: Part, name: str, index: int, digest: str) -> tuple[
     if part.quads is not None:
         relevant.pop("triangulations")
     else:
-        relevant = asdict(_operator_settings(settings))
+        relevant = asdict(operator_settings(settings))
     text = json.dumps([REVISION, digest, name, relevant], sort_keys=True)
     key = hashlib.sha256(text.encode()).hexdigest()[:32]
     split = _split(job)
     kept = _kept(job.out / "samples" / f"{name}.npz", key)
     if kept is not None:
         return replace(kept[0], split=split), kept[1]
-    made = _make(part, index, np.random.default_rng(int(key, 16)), settings)
-    arrays = _operator_arrays(made.mesh, settings)
+    made = make_sample(part, index, np.random.default_rng(int(key, 16)), settings)
+    arrays = operator_arrays(made.mesh, settings)
     if made.field is not None:
-        arrays |= _truth_arrays(made.field)
+        arrays |= truth_arrays(made.field)
     entry = SampleEntry(
         name=name,
         shape=job.shape,
@@ -288,61 +236,10 @@ def _sample(job: _Job, part: Part, name: str, index: int, digest: str) -> tuple[
     return entry, arrays["features"].shape[1]
 
 
-@dataclass(frozen=True, eq=False)
-class _Made:
-    mesh: TriMesh
-    field: CrossField | None
-    variant: str
-
-
-def _make(part: Part, index: int, rng: np.random.Generator, settings: PreprocessSettings) -> _Made:
-    """The triangle mesh and the truth of one sample; quads are varied from the second sample on."""
-    if part.mesh is not None:
-        return _Made(part.mesh, part.field, "plain" if part.field is None else "pair")
-    assert part.vertices is not None
-    assert part.quads is not None
-    low, high = settings.vertices
-    n_vertices = round(float(np.exp(rng.uniform(np.log(low), np.log(high)))))
-    vertices, quads, variant = part.vertices, part.quads, []
-    if index > 0 and rng.random() < settings.deform:
-        variant.append("deformed")
-        vertices = deform(vertices, rng)
-        if rng.random() < 0.5:
-            vertices, quads = mirror(vertices, quads)
-    crop = None
-    if index > 0 and rng.random() < settings.crops:
-        variant.append("cropped")
-        crop = partial(crop_height, rng=rng)
-    target = make_target(vertices, quads, n_vertices, rng, crop)
-    return _Made(target.mesh, target.field, "+".join(variant) or "whole")
-
-
-def _operator_settings(settings: PreprocessSettings) -> OperatorSettings:
-    return OperatorSettings(k=settings.k, features=settings.features, turned=settings.turned)
-
-
-def _operator_arrays(mesh: TriMesh, settings: PreprocessSettings) -> dict[str, NDArray[Any]]:
-    operators = build_operators(mesh, _operator_settings(settings))
-    return {
-        "vertices": mesh.vertices,
-        "faces": mesh.faces,
-        "mass": operators.mass,
-        "eigenvalues": operators.eigenvalues,
-        "eigenvectors": operators.eigenvectors.astype(np.complex64),
-        "features": operators.features.astype(np.complex64),
-    }
-
-
-def _truth_arrays(field: CrossField) -> dict[str, NDArray[Any]]:
-    coherence = np.abs(field.z) if field.confidence is None else field.confidence
-    size = np.zeros(len(field)) if field.size is None else field.size
-    return {"z": field.z, "size": size, "coherence": coherence}
-
-
 def _kept(path: Path, key: str) -> tuple[SampleEntry, int] | None:
     """The entry and the channels of a sample made earlier, if it is whole and has the same key."""
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             raw = json.loads(str(archive["entry"]))
             if raw["key"] != key:
                 return None
