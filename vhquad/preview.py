@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -55,7 +56,7 @@ def check_viz() -> None:
     ConfigError
     """
     try:
-        import pyvista  # noqa: F401
+        import_module("pyvista")
     except ImportError as error:
         raise ConfigError(
             f"a preview needs the extra viz ({error}); install it with: pip install 'vhquad[viz]'"
@@ -84,9 +85,8 @@ def draw_preview(
         If pyvista is not installed.
     """
     check_viz()
-    import pyvista as pv
-    import vtk
-
+    pv: Any = import_module("pyvista")
+    vtk: Any = import_module("vtk")
     vtk.vtkObject.GlobalWarningDisplayOff()  # it complains of the missing display, then copes
     height = PANEL[1]
     plotter = pv.Plotter(

@@ -22,6 +22,9 @@ from vhquad.cli.outputs import MESHES, check_outputs, json_file
 from vhquad.errors import ConfigError
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from vhquad.mesh.load import LoadedMesh
     from vhquad.quad.pipeline import RemeshResult
 
@@ -85,6 +88,15 @@ def remesh(
             "an OBJ file count as creases in place of those found.",
         ),
     ] = "40",
+    sharp: Annotated[
+        Path | None,
+        typer.Option(
+            "--sharp",
+            metavar="FILE",
+            help="Edges to keep from a QuadWild .sharp file, in place of --crease.",
+            show_default=False,
+        ),
+    ] = None,
     method: Annotated[
         Method,
         typer.Option("--method", help="Cross field by the network, or along the curvature."),
@@ -137,7 +149,7 @@ def remesh(
             ("--json", json_file(json), (".json",)),
             ("--preview", preview, (".png",)),
         ],
-        inputs=[mesh, field],
+        inputs=[mesh, field, sharp],
     )
     if field is not None and (model is not None or method is Method.curvature):
         raise ConfigError("--field brings its own field; leave out --model and --method")
@@ -185,7 +197,7 @@ def remesh(
             loaded.mesh,
             cross,
             settings,
-            creases=None if angle is None else loaded.crease_edges,
+            creases=_given_creases(loaded, angle, sharp),
             repair_lines=loaded.lines(),
             seconds=seconds,
             progress=progress,
@@ -201,6 +213,17 @@ def remesh(
             draw_preview(preview, loaded.mesh, cross, result.quads)
     publish(shell, json, result.report, str(target))
     _judge(loaded, result)
+
+
+def _given_creases(
+    loaded: LoadedMesh, angle: float | None, sharp: Path | None
+) -> NDArray[np.int64] | None:
+    """Vertex pairs from a file of edges, else from the mesh file's lines; None to look for some."""
+    if sharp is not None:
+        from vhquad.field.sharp import read_sharp
+
+        return read_sharp(sharp, loaded.mesh)
+    return None if angle is None else loaded.crease_edges
 
 
 def _write_uv(path: Path, result: RemeshResult) -> None:
