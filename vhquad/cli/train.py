@@ -26,7 +26,7 @@ def train(
     datasets: Annotated[
         list[Path],
         typer.Argument(
-            metavar="DATASET...",
+            metavar="DATASET",
             help="Made by `vhquad preprocess`; several are mixed.",
             show_default=False,
         ),
