@@ -32,7 +32,7 @@ __all__ = ["IntegerMap", "integer_map"]
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-SOLVES = 8  # stiffened linear solves before the careful way
+SOLVES = 3  # stiffened linear solves before the careful way
 CAP = 1e3  # largest weight of a triangle in them
 LEAST_DETERMINANT = 0.1  # relative; triangles below are stiffened
 REACH = 0.7  # of the way to the first fold that a careful step goes
