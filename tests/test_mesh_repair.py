@@ -227,7 +227,12 @@ def test_most_of_the_area_decides_for_a_flat_sheet() -> None:
 def test_an_edge_between_the_same_two_vertices_twice() -> None:
     v, f = meshes.doubled_edge()
     result = repair(v, f)
-    assert (result.report.nonmanifold_edges, result.report.added_vertices) == (3, 1)
+    kept = np.sort(np.delete(f, [1, 2], axis=0), axis=1)
+    _, count = np.unique(
+        kept[:, [[0, 1], [0, 2], [1, 2]]].reshape(-1, 2), axis=0, return_counts=True
+    )
+    assert result.report.nonmanifold_edges == (count > 2).sum() == 4
+    assert result.report.added_vertices == 1
     (new,) = np.flatnonzero(result.vertex_source < 0)
     # It lies in the middle of an old edge, and both halves of the face come from one face.
     middle = 0.5 * (v[:, None] + v[None])

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from vhquad.mesh.orient import Sides, colour
 from vhquad.mesh.weld import components
 
-__all__ = ["Gluing", "clashing_edges", "glue"]
+__all__ = ["Gluing", "glue"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -103,27 +103,6 @@ def glue(points: Floats, faces: Ints, weld: Ints) -> Gluing:
         crowded=int((count > 2).sum()),
         cut=int((~first.agrees).sum()),
     )
-
-
-def clashing_edges(gluing: Gluing) -> Ints:
-    """Halfedges of edges that would have the same two vertices as another edge.
-
-    Returns
-    -------
-    (c, 2) int64
-        The two halfedges of each such edge, twice the same one on a boundary; of edges between the
-        same vertices all but one.
-    """
-    single = np.ones(gluing.vertex.size, dtype=bool)
-    single[gluing.first] = False
-    single[gluing.second] = False
-    lonely = np.flatnonzero(single)
-    edges = np.concatenate(
-        [np.stack([gluing.first, gluing.second], axis=1), np.stack([lonely, lonely], axis=1)]
-    )
-    key = _keys(gluing.vertex, gluing.vertex.size)[edges[:, 0]]
-    _, keep = np.unique(key, return_index=True)
-    return np.delete(edges, keep, axis=0)
 
 
 def _keys(faces: Ints, n: int) -> Ints:

@@ -2,8 +2,8 @@
 
 Steps, each in a module of its own: copies of faces go (duplicates), seams are welded (weld), faces
 without area are collapsed or flipped away (degenerate), faces are paired at their edges so that
-every edge and vertex is manifold and winding is consistent (glue, orient), and parts are turned
-outward (outward). All is repeated until nothing changes, so repairing twice is repairing once.
+every edge and vertex is manifold and winding is consistent (glue, orient, untie), and parts are
+turned outward (outward). All is repeated until nothing changes, so once is enough.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vhquad.errors import MeshError
-from vhquad.mesh.degenerate import remove_degenerate
+from vhquad.mesh.degenerate import is_degenerate, remove_degenerate
 from vhquad.mesh.duplicates import drop_copies_of_parts, drop_duplicates
-from vhquad.mesh.glue import Gluing, clashing_edges, glue
+from vhquad.mesh.glue import Gluing
 from vhquad.mesh.outward import inward_faces
 from vhquad.mesh.repair_report import RepairReport
 from vhquad.mesh.triangle import TriMesh
+from vhquad.mesh.untie import Soup, untie
 from vhquad.mesh.weld import components, open_vertices, position_classes, weld_seams
 
 __all__ = ["RepairReport", "RepairResult", "repair"]
@@ -29,7 +30,6 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 _PASSES = 6
-_SPLITS = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,31 +115,30 @@ def _once(stage: _Stage) -> _Stage:
         raise MeshError(
             f"none of the {len(stage.faces)} faces has any area; check the scale and the export"
         )
-    points, unit, vertex_source, weld = stage.points, stage.unit, stage.vertex_source, flat.weld
-    added = 0
-    for _ in range(_SPLITS):
-        gluing = glue(unit, faces, weld)
-        clash = clashing_edges(gluing)
-        if len(clash) == 0:
-            break
-        faces, source, ends = _split(faces, source, clash, len(points))
-        points = np.concatenate([points, points[weld[ends]].mean(axis=1)])
-        unit = np.concatenate([unit, unit[weld[ends]].mean(axis=1)])
-        weld = np.concatenate([weld, np.arange(len(weld), len(points))])
-        vertex_source = np.concatenate([vertex_source, np.full(len(ends), -1, dtype=np.int64)])
-        added += len(ends)
+    soup, gluing = untie(
+        Soup(
+            stage.points,
+            stage.unit,
+            faces,
+            flat.weld,
+            stage.vertex_source,
+            stage.face_source[source],
+        )
+    )
+    added = soup.vertex_source[len(stage.points) :]
     return _assemble(
-        _Stage(points, unit, faces, vertex_source, stage.face_source[source], stage.report),
-        weld,
+        soup,
         gluing,
-        RepairReport(
+        stage.report
+        + RepairReport(
             degenerate_faces=flat.removed,
             cut_faces=flat.cut,
             duplicate_faces=copies + flat.copies,
             folded_faces=folds + flat.folds,
             nonmanifold_edges=gluing.crowded,
             cut_edges=gluing.cut,
-            added_vertices=added,
+            added_vertices=int((added < 0).sum()),
+            split_vertices=int((added >= 0).sum()),
         ),
     )
 
@@ -159,9 +158,13 @@ def _without_copies(points: Floats, faces: Ints) -> tuple[Ints, Ints, int, int]:
     open_part[part[(border[faces]).any(axis=1)]] = True
     closed = ~open_part[part]
     copy = drop_copies_of_parts(place, part, closed)
-    kept = drop_duplicates(place[~copy], closed[~copy])
-    source, faces = source[~copy][kept.keep], faces[~copy][kept.keep]
-    return faces, source, first.copies + int(copy.sum()) + kept.copies, first.folds + kept.folds
+    # Faces without area may well lie on one another in different layers: they are left for later.
+    rest = np.flatnonzero(~copy & ~is_degenerate(points[faces])[0])
+    kept = drop_duplicates(place[rest], closed[rest])
+    stay = ~copy
+    stay[rest] = kept.keep
+    copies = first.copies + int(copy.sum()) + kept.copies
+    return faces[stay], source[stay], copies, first.folds + kept.folds
 
 
 def _face_parts(faces: Ints, n: int) -> Ints:
@@ -172,66 +175,33 @@ def _face_parts(faces: Ints, n: int) -> Ints:
     return np.asarray(np.unique(vertex[faces[:, 0]], return_inverse=True)[1], dtype=np.int64)
 
 
-def _split(faces: Ints, source: Ints, clash: Ints, n: int) -> tuple[Ints, Ints, Ints]:
-    """Cut edges that double another at a new vertex each; a face takes part in one cut at most.
-
-    Returns the faces, their sources, and the ends of each edge cut; (c, 2).
-    """
-    owner = clash // 3
-    claim = np.full(len(faces), len(clash), dtype=np.int64)
-    np.minimum.at(claim, owner, np.arange(len(clash))[:, None])
-    clash = clash[(claim[owner] == np.arange(len(clash))[:, None]).all(axis=1)]
-    ends = np.stack([faces.reshape(-1)[clash[:, 0]], _head(faces, clash[:, 0])], axis=1)
-    pair = clash[:, 0] != clash[:, 1]
-    h = np.concatenate([clash[:, 0], clash[pair, 1]])
-    new = n + np.concatenate([np.arange(len(clash)), np.flatnonzero(pair)])
-    f, k = h // 3, h % 3
-    tail, head, apex = faces[f, k], faces[f, (k + 1) % 3], faces[f, (k + 2) % 3]
-    stay = np.ones(len(faces), dtype=bool)
-    stay[f] = False
-    parts = [faces[stay], np.stack([tail, new, apex], 1), np.stack([new, head, apex], 1)]
-    return np.concatenate(parts), np.concatenate([source[stay], source[f], source[f]]), ends
-
-
-def _head(faces: Ints, h: Ints) -> Ints:
-    return faces.reshape(-1)[h - h % 3 + (h + 1) % 3]
-
-
-def _assemble(stage: _Stage, weld: Ints, gluing: Gluing, report: RepairReport) -> _Stage:
+def _assemble(soup: Soup, gluing: Gluing, report: RepairReport) -> _Stage:
     """Number the new vertices by their sources, turn faces over, and count."""
-    own = stage.faces.reshape(-1)
+    own = soup.faces.reshape(-1)
     vertex = gluing.vertex.reshape(-1)
-    lowest = np.full(int(vertex.max()) + 1, len(stage.points), dtype=np.int64)
+    lowest = np.full(int(vertex.max()) + 1, len(soup.points), dtype=np.int64)
     np.minimum.at(lowest, vertex, own)
     order = np.lexsort((np.arange(len(lowest)), lowest))
     number = np.zeros(len(lowest), dtype=np.int64)
     number[order] = np.arange(len(order))
-    chosen = weld[lowest[order]]
-    faces = number[gluing.vertex]
-    points, unit = stage.points[chosen], stage.unit[chosen]
+    chosen = soup.weld[lowest[order]]
+    points, unit = soup.points[chosen], soup.unit[chosen]
 
-    by_source = np.argsort(stage.face_source, kind="stable")
-    faces, turned = faces[by_source], gluing.turned[by_source].copy()
+    by_source = np.argsort(soup.face_source, kind="stable")
+    faces, turned = number[gluing.vertex][by_source], gluing.turned[by_source].copy()
     faces[turned] = faces[turned][:, [0, 2, 1]]
     inward = inward_faces(TriMesh(unit, faces), turned)
     faces[inward] = faces[inward][:, [0, 2, 1]]
 
-    joint = np.sort(vertex * np.int64(len(stage.points)) + own)
+    joint = np.sort(vertex * np.int64(len(soup.points)) + own)
     pairs = 1 + int((joint[1:] != joint[:-1]).sum())
-    report = replace(
-        report,
+    report += RepairReport(
         turned_faces=int((turned ^ inward).sum()),
         welded_vertices=pairs - len(lowest),
         split_vertices=pairs - int((np.bincount(own) > 0).sum()),
     )
-    return _Stage(
-        points,
-        unit,
-        faces,
-        stage.vertex_source[lowest[order]],
-        stage.face_source[by_source],
-        stage.report + report,
-    )
+    sources = soup.vertex_source[lowest[order]], soup.face_source[by_source]
+    return _Stage(points, unit, faces, *sources, report)
 
 
 # ---- checks and counts ------------------------------------------------------------------------
