@@ -149,17 +149,15 @@ def test_two_sided_sheet_keeps_one_side() -> None:
 
 
 def test_a_wall_between_two_rooms_goes() -> None:
-    v, f = meshes.unwelded(voxels([[[1]], [[1]]]))
-    left = meshes.unwelded(meshes.moved(meshes.cube(1), (0.5, 0.0, 0.0)))
-    right = meshes.unwelded(meshes.moved(meshes.cube(1), (-0.5, 0.0, 0.0)))
-    both = (np.vstack([left[0], right[0]]), np.vstack([left[1], right[1] + len(left[0])]))
-    joined, plain = repair(*both), repair(v, f)
-    # The same wall triangulated the same way from both sides: both copies go.
-    assert joined.report.folded_faces in (0, 4)
-    assert volume(joined.mesh) == pytest.approx(2.0)
-    assert volume(plain.mesh) == pytest.approx(2.0)
-    assert joined.mesh.is_closed
-    assert_sound(joined)
+    left = meshes.moved(meshes.cube(1), (-0.5, 0.0, 0.0))
+    right = TriMesh(left.vertices * np.array([-1.0, 1.0, 1.0]), left.faces[:, ::-1])
+    result = repair(*meshes.unwelded(meshes.merge(left, right)))
+    assert result.report.folded_faces == 4
+    assert (result.mesh.n_vertices, result.mesh.euler_characteristic) == (12, 2)
+    assert result.mesh.is_closed
+    assert volume(result.mesh) == pytest.approx(2.0)
+    assert result.mesh.area == pytest.approx(10.0)
+    assert_sound(result)
 
 
 def test_closed_parts_that_touch_stay_apart() -> None:
