@@ -9,6 +9,8 @@ from scipy.sparse.csgraph import connected_components
 
 from vhquad.errors import ConfigError, MeshError
 from vhquad.field.matching import MatchedField
+from vhquad.field.sharpness import is_sudden
+from vhquad.geometry import curvature
 from vhquad.mesh.triangle import TriMesh, next_halfedge
 
 __all__ = [
@@ -26,16 +28,21 @@ Bools = NDArray[np.bool_]
 
 def dihedral_angles(mesh: TriMesh) -> Floats:
     """Angle between the normals of an edge's two faces, in [0, pi], 0 on boundaries; (ne,)."""
-    h = mesh.edge_halfedges
-    inner = (h >= 0).all(axis=1)
-    n = mesh.face_normals[h // 3]
-    sine = np.linalg.norm(np.cross(n[:, 0], n[:, 1]), axis=1)
-    cosine = np.einsum("ei,ei->e", n[:, 0], n[:, 1])
-    return np.where(inner, np.arctan2(sine, cosine), 0.0)
+    either = mesh.edge_halfedges.max(axis=1)
+    return np.asarray(np.abs(curvature.dihedral_angles(mesh)[either]))
+
+
+def sharp_edges(mesh: TriMesh, degrees: float) -> Ints:
+    """All edges sharper than an angle; (k,) edge indices."""
+    if not 0.0 < degrees <= 180.0:
+        raise ConfigError(f"a crease angle lies between 0 and 180 degrees, not at {degrees}")
+    return np.flatnonzero(dihedral_angles(mesh) > np.radians(degrees))
 
 
 def find_creases(mesh: TriMesh, degrees: float = 40.0, shortest: float = 0.0) -> Ints:
-    """Edges sharper than an angle, in connected pieces that are long enough.
+    """Creases: chains of sharp edges that bend the surface all at once, if long enough.
+
+    Sharp edges of noise and of round folds are no creases, see ``vhquad.field.sharpness``.
 
     Parameters
     ----------
@@ -50,10 +57,10 @@ def find_creases(mesh: TriMesh, degrees: float = 40.0, shortest: float = 0.0) ->
     (k, 2) int64
         Vertex pairs (lower, higher), sorted.
     """
-    if not 0.0 < degrees <= 180.0:
-        raise ConfigError(f"a crease angle lies between 0 and 180 degrees, not at {degrees}")
-    pairs = mesh.edges[dihedral_angles(mesh) > np.radians(degrees)]
-    return drop_short_creases(mesh, pairs, shortest)
+    edges = sharp_edges(mesh, degrees)
+    angle = dihedral_angles(mesh)[edges]
+    edges = edges[is_sudden(mesh, edges, angle, 0.85 * np.radians(degrees))]
+    return drop_short_creases(mesh, mesh.edges[edges], shortest)
 
 
 def drop_short_creases(mesh: TriMesh, pairs: Ints, shortest: float) -> Ints:
