@@ -191,19 +191,19 @@ def _cover(
         layers.append(front)
     rows_all = np.concatenate(layers)
     rows_all = rows_all[np.argsort(rows_all[:, 0], kind="stable")]
-    corners = np.stack(
-        [
-            rotate(seamless.uv[rows_all[:, 1], k], rows_all[:, 2]) + rows_all[:, 3:5]
-            for k in range(3)
-        ],
-        axis=1,
-    ) * seamless.unit
+    corners = (
+        np.stack(
+            [
+                rotate(seamless.uv[rows_all[:, 1], k], rows_all[:, 2]) + rows_all[:, 3:5]
+                for k in range(3)
+            ],
+            axis=1,
+        )
+        * seamless.unit
+    )
     z = corners[..., 0] + 1j * corners[..., 1]
     cut = np.searchsorted(rows_all[:, 0], np.arange(len(tmesh.patches) + 1))
-    return {
-        p: (rows_all[cut[p] : cut[p + 1], 1], z[cut[p] : cut[p + 1]])
-        for p in wanted
-    }
+    return {p: (rows_all[cut[p] : cut[p + 1], 1], z[cut[p] : cut[p + 1]]) for p in wanted}
 
 
 def _meets(a: Ints, b: Ints, size: Floats) -> NDArray[np.bool_]:

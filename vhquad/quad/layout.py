@@ -74,9 +74,7 @@ class Layout:
     def grid(self, patch: int) -> Ints:
         """Lattice points of a patch as an (a + 1, b + 1) array, first index along side 0."""
         p = self.tmesh.patches[patch]
-        return _grid(
-            *(_side_points(self, side) for side in p.sides), int(self.patch_offset[patch])
-        )
+        return _grid(*(_side_points(self, side) for side in p.sides), int(self.patch_offset[patch]))
 
 
 def _side_points(layout: Layout, side: tuple[int, ...]) -> Ints:

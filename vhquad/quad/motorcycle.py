@@ -306,9 +306,7 @@ def _exit(charts: _Charts, step: Step) -> tuple[int, float, float]:
     p = charts.uv[step.face]
     if step.enter < 0:
         start = next(
-            k
-            for k in range(3)
-            if p[k][axis] == step.start and p[k][1 - axis] == step.level
+            k for k in range(3) if p[k][axis] == step.start and p[k][1 - axis] == step.level
         )
         k = (start + 1) % 3
     else:

@@ -141,13 +141,15 @@ def remesh_mesh(
     watch = _Watch()
     if field.domain == "vertices":
         if len(field) != mesh.n_vertices:
-            raise FieldError(f"the field has {len(field)} crosses, the mesh {mesh.n_vertices} vertices")
+            raise FieldError(
+                f"the field has {len(field)} crosses, the mesh {mesh.n_vertices} vertices"
+            )
         field = to_faces(mesh, field)
     if len(field) != mesh.n_faces:
         raise FieldError(f"the field has {len(field)} crosses, the mesh {mesh.n_faces} faces")
     size, asked = _sizes(mesh, field, settings)
     field = replace(field, size=size)
-    sharp = _creases(mesh, settings, creases, float(np.median(size)))
+    given = None if creases is None else np.asarray(creases, dtype=np.int64).reshape(-1, 2)
     quads: list[QuadMesh] = []
     reports: list[ComponentReport] = []
     n_parts = mesh.n_components
@@ -162,8 +164,10 @@ def remesh_mesh(
         part, used = mesh.submesh(inside)
         local = np.full(mesh.n_vertices, -1)
         local[used] = np.arange(len(used))
-        own = local[sharp]
-        own = own[(own >= 0).all(axis=1)]
+        own: Ints | None = None
+        if given is not None:
+            own = local[given]
+            own = own[(own >= 0).all(axis=1)]
         part_field = CrossField(
             "faces",
             field.z[inside],
@@ -171,7 +175,7 @@ def remesh_mesh(
             None if field.confidence is None else field.confidence[inside],
         )
         target = max(round(float(density[inside].sum())), LEAST_QUADS)
-        made, report = _remesh_part(part, part_field, own, target, tell)
+        made, report = _remesh_part(part, part_field, own, settings.crease, target, tell)
         quads.append(made)
         reports.append(report)
     result = _joined(quads)
@@ -220,16 +224,6 @@ def _sizes(mesh: TriMesh, field: CrossField, settings: RemeshSettings) -> tuple[
     return size * np.sqrt(count / target), max(round(target), 1)
 
 
-def _creases(
-    mesh: TriMesh, settings: RemeshSettings, given: ArrayLike | None, length: float
-) -> Ints:
-    if given is not None:
-        return np.asarray(given, dtype=np.int64).reshape(-1, 2)
-    if settings.crease is None:
-        return np.zeros((0, 2), dtype=np.int64)
-    return find_creases(mesh, settings.crease, shortest=2.5 * length)
-
-
 def _joined(parts: list[QuadMesh]) -> QuadMesh:
     offset = np.cumsum([0, *(part.n_vertices for part in parts)])
     return QuadMesh(
@@ -240,45 +234,62 @@ def _joined(parts: list[QuadMesh]) -> QuadMesh:
 
 @dataclass(frozen=True)
 class _Attempt:
-    """One way to try: smoothing of the field in wanted edge lengths, with or without creases."""
+    """One way to try; lengths are in wanted quad edges.
 
+    ``smoothing``: detail of the field below this is smoothed away. ``crease_length``: creases must
+    hang together over this length; None: no creases.
+    """
+
+    name: str
     smoothing: float
-    creases: bool
+    crease_length: float | None
+
+    def creases(
+        self, mesh: TriMesh, given: Ints | None, angle: float | None, length: float
+    ) -> Ints:
+        """Crease edges of a component that this attempt keeps."""
+        if self.crease_length is None:
+            return np.zeros((0, 2), dtype=np.int64)
+        if given is not None:
+            return given
+        if angle is None:
+            return np.zeros((0, 2), dtype=np.int64)
+        return find_creases(mesh, angle, self.crease_length * length)
 
 
+MAP = "integer-grid map"
 _ATTEMPTS = (
-    _Attempt(0.5, True),
-    _Attempt(1.5, True),
-    _Attempt(4.0, True),
-    _Attempt(1.5, False),
+    _Attempt(MAP, 0.5, 2.5),
+    _Attempt(f"{MAP}, smoother field", 1.5, 8.0),
+    _Attempt(f"{MAP}, no creases", 1.5, None),
+    _Attempt(f"{MAP}, no creases, smoothest field", 5.0, None),
 )
 
 
 def _remesh_part(
-    mesh: TriMesh, field: CrossField, creases: Ints, target: int, tell: Progress
+    mesh: TriMesh,
+    field: CrossField,
+    given: Ints | None,
+    angle: float | None,
+    target: int,
+    tell: Progress,
 ) -> tuple[QuadMesh, ComponentReport]:
     """Quads of one component by the first attempt that gives a valid mesh of about the count."""
     watch = _Watch()
     surface = ClosestPoints(mesh)
+    length = float(np.sqrt(mesh.area / target))
     reasons: list[str] = []
     best: tuple[float, QuadMesh, AlignedField, str] | None = None
     for attempt in _ATTEMPTS:
-        if not attempt.creases and len(creases) == 0:
-            continue
-        sharp = creases if attempt.creases else creases[:0]
+        creases = attempt.creases(mesh, given, angle, length)
         try:
-            quads, aligned = _by_map(mesh, field, sharp, target, attempt, surface, watch, tell)
+            quads, aligned = _by_map(mesh, field, creases, target, attempt, surface, watch, tell)
         except (ParametrizationError, FieldError) as problem:
             reasons.append(str(problem))
             continue
         miss = abs(np.log(quads.n_quads / target))
-        method = "integer-grid map"
-        if attempt is not _ATTEMPTS[0]:
-            method = "integer-grid map, smoother field"
-            if not attempt.creases:
-                method = "integer-grid map, creases given up"
         if best is None or miss < best[0]:
-            best = (miss, quads, aligned, method)
+            best = (miss, quads, aligned, attempt.name)
         if miss <= np.log(NEAR_COUNT):
             break
         reasons.append(f"{quads.n_quads} quads where {target} were asked for")
@@ -296,7 +307,7 @@ def _remesh_part(
         target=target,
         made=quads.n_quads,
         method=method,
-        reason="" if method == "integer-grid map" else "; ".join(dict.fromkeys(reasons)),
+        reason="" if method == MAP else "; ".join(dict.fromkeys(reasons)),
         singularities=singularities,
         cancelled=cancelled,
         seconds=dict(watch.seconds),
@@ -374,5 +385,3 @@ def _constraints(layout: Layout) -> tuple[NDArray[np.bool_], CurveConstraints]:
     closed = [bool(np.array_equal(c[0], c[-1])) for c in tmesh.curves]
     lines = [c[:-1] if loop else c for c, loop in zip(tmesh.curves, closed, strict=True)]
     return fixed, CurveConstraints(lines, closed, curve)
-
-

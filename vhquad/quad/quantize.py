@@ -29,6 +29,7 @@ Ints = NDArray[np.int64]
 
 COUNT_TOLERANCE = 0.03  # stop adjusting the scale once the count is this near
 MOST_SCALES = 6
+HOPELESS = np.log(1.5)  # surplus after two tries at which smaller scales are not worth a third
 MOST_ROUNDS = 40
 MOST_DIVES = 60
 MIP_SECONDS = 20.0
@@ -75,6 +76,8 @@ def quantise(tmesh: TMesh, target_quads: float, area: float) -> Quantisation:
         if miss <= np.log1p(COUNT_TOLERANCE):
             break
         tried.append((np.log(scale), np.log(count / target_quads)))
+        if len(tried) == 2 and min(m for _, m in tried) > HOPELESS:
+            break  # what must stay apart takes more quads than that
         following = _next_scale(tried)
         if any(abs(following - s) < 1e-3 for s, _ in tried):
             break

@@ -79,18 +79,25 @@ def twice_area(uv: Ints) -> Ints:
 
 @dataclass(frozen=True)
 class _Schedule:
-    """A way of stiffening: the largest weight, the rings around bad triangles, and whether
-    distorted triangles count as bad besides nearly folded ones."""
+    """A way of stiffening: triangles whose area shrinks below a share of the wanted one, or that
+    are strongly distorted (if asked for), and the rings around them get larger weights."""
 
+    share: float
+    factor: float
     cap: float
-    rings: int
-    distorted: bool
+    rings: int = 0
+    distorted: bool = False
 
 
-# Which of these ends without folds differs from mesh to mesh; the first mostly does.
-_SCHEDULES = (_Schedule(1e2, 1, True), _Schedule(1e4, 2, True), _Schedule(1e4, 1, False))
-_SOLVES_EACH = 12
-_PATIENCE = 4  # solves without fewer folds before the next schedule
+# Which of these ends without folds differs from mesh to mesh; the first mostly does, soonest.
+_SCHEDULES = (
+    _Schedule(share=0.2, factor=3.0, cap=1e6),
+    _Schedule(share=0.1, factor=2.0, cap=1e6),
+    _Schedule(share=0.1, factor=2.0, cap=1e4, rings=2, distorted=True),
+    _Schedule(share=0.1, factor=2.0, cap=1e4, rings=1),
+)
+_SOLVES_EACH = 16
+_PATIENCE = 8  # solves without fewer folds before the next schedule
 
 
 def solve_seamless_map(
@@ -211,14 +218,14 @@ class _Problem:
         off = 2 * (
             np.abs(holomorphic / self.target.conj() - 1) ** 2 + np.abs(anti / self.target) ** 2
         )
-        bad = jacobian < 0.1
+        bad = jacobian < schedule.share
         if schedule.distorted:
             bad |= off > 1.5**2
         for _ in range(schedule.rings):
             touched = np.zeros(self.mesh.n_vertices, dtype=bool)
             touched[self.mesh.faces[bad]] = True
             bad = touched[self.mesh.faces].any(axis=1)
-        return np.where(bad, np.minimum(2 * weight, schedule.cap), weight)
+        return np.where(bad, np.minimum(schedule.factor * weight, schedule.cap), weight)
 
 
 def _local_corners(mesh: TriMesh) -> NDArray[np.complex128]:

@@ -178,9 +178,7 @@ def _crowded_classes(layout: Layout) -> dict[int, list[list[int]]]:
     for label, members in groups.items():
         parts: list[list[int]] = []
         for group in members.values():
-            special = [
-                q for q in group if q < len(tmesh.node_vertex) and tmesh.node_vertex[q] >= 0
-            ]
+            special = [q for q in group if q < len(tmesh.node_vertex) and tmesh.node_vertex[q] >= 0]
             if len(special) > 1:
                 parts.extend([q] for q in special)
             else:

@@ -347,9 +347,7 @@ def _make_arcs(
         low, high = places[i], places[i + 1]
         inside = (at > low) & (at < high)
         where = np.concatenate([[low], at[inside], [high]])
-        polyline = np.concatenate(
-            [[b.points[nodes[i]]], points[inside], [b.points[nodes[i + 1]]]]
-        )
+        polyline = np.concatenate([[b.points[nodes[i]]], points[inside], [b.points[nodes[i + 1]]]])
         face, direction, u, v = back_charts[i + 1]
         made.append(len(b.arcs))
         b.arcs.append(
@@ -367,7 +365,9 @@ def _make_arcs(
     return made
 
 
-def _feature_curves(b: _Builder) -> tuple[list[list[int]], dict[int, int], dict[int, tuple[int, bool]]]:
+def _feature_curves(
+    b: _Builder,
+) -> tuple[list[list[int]], dict[int, int], dict[int, tuple[int, bool]]]:
     """Feature halfedges chained between special vertices; curve and place of each halfedge."""
     mesh = b.mesh
     feature = np.flatnonzero(b.aligned.feature)
@@ -423,7 +423,9 @@ def _cut_curve(
     def chart(index: int, fraction: float) -> tuple[int, int, float, float]:
         step = head_uv[index] - tail_uv[index]
         place = tail_uv[index] + fraction * step
-        direction = (0 if step[0] > 0 else 2) if abs(step[0]) > abs(step[1]) else (1 if step[1] > 0 else 3)
+        direction = (
+            (0 if step[0] > 0 else 2) if abs(step[0]) > abs(step[1]) else (1 if step[1] > 0 else 3)
+        )
         return int(faces[index]), direction, float(place[0]), float(place[1])
 
     def back_chart(index: int, fraction: float) -> tuple[int, int, float, float]:
@@ -435,7 +437,9 @@ def _cut_curve(
         a, c = b.uv[f, side].astype(np.float64), b.uv[f, (side + 1) % 3].astype(np.float64)
         step = a - c
         place = c + fraction * step
-        direction = (0 if step[0] > 0 else 2) if abs(step[0]) > abs(step[1]) else (1 if step[1] > 0 else 3)
+        direction = (
+            (0 if step[0] > 0 else 2) if abs(step[0]) > abs(step[1]) else (1 if step[1] > 0 else 3)
+        )
         return f, direction, float(place[0]), float(place[1])
 
     nodes = [b.node_of_vertex[int(mesh.tail[curve[0]])]]
