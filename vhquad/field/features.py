@@ -19,6 +19,7 @@ __all__ = [
     "drop_short_creases",
     "find_creases",
     "hopeless_creases",
+    "sharp_edges",
 ]
 
 Floats = NDArray[np.float64]
