@@ -84,8 +84,9 @@ def test_what_cannot_be_used_is_named(tmp_path: Path) -> None:
     assert "another file of that name" in reasons["ring0.off"]
 
 
-def test_triangles_with_and_without_fields(tmp_path: Path) -> None:
-    """4. A field of the same stem is the truth; plain meshes get operators only."""
+def test_triangles_with_and_without_fields(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """4. A field of the same stem is the truth; plain meshes get operators, kept for predict."""
+    monkeypatch.setenv("VHQUAD_CACHE", str(tmp_path / "cache"))
     folder = tmp_path / "in"
     folder.mkdir()
     mesh = blob(3)
@@ -99,6 +100,7 @@ def test_triangles_with_and_without_fields(tmp_path: Path) -> None:
     assert by_name["plain.t0"].variant == "plain"
     assert not by_name["plain.t0"].truth
     assert dataset.load(by_name["plain.t0"]).truth is None
+    assert len(list((tmp_path / "cache").glob("*.npz"))) == 1
     truth = dataset.load(by_name["pair.t0"]).truth
     assert truth is not None
     assert float(truth.size.max()) == 0.0  # .rosy holds no sizes
@@ -123,8 +125,11 @@ def test_parts_become_samples_of_their_own(tmp_path: Path) -> None:
     assert {e.shape for e in dataset.samples} == {"twins"}
 
 
-def test_plain_meshes_keep_their_largest_part(tmp_path: Path) -> None:
+def test_plain_meshes_keep_their_largest_part(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """6. One network input is one connected surface."""
+    monkeypatch.setenv("VHQUAD_CACHE", str(tmp_path / "cache"))
     folder = tmp_path / "in"
     folder.mkdir()
     write_triangle_mesh(folder / "two.obj", merge(blob(3), moved(blob(2), (5.0, 0.0, 0.0), 0.3)))

@@ -4,7 +4,8 @@ What each file gives:
 
 - a mesh of quads only: samples with ground truth, see ``targets.py``, several a shape;
 - a triangle mesh with a field file of the same stem beside it: one sample with that truth;
-- any other triangle mesh: one sample without truth.
+- any other triangle mesh: one sample without truth; its operators also go to the cache that
+  ``predict`` looks into.
 """
 
 from __future__ import annotations
@@ -217,7 +218,7 @@ def _sample(job: _Job, part: Part, name: str, index: int, digest: str) -> tuple[
     if kept is not None:
         return replace(kept[0], split=split), kept[1]
     made = make_sample(part, index, np.random.default_rng(int(key, 16)), settings)
-    arrays = operator_arrays(made.mesh, settings)
+    arrays = operator_arrays(made.mesh, settings, keep=made.field is None)
     if made.field is not None:
         arrays |= truth_arrays(made.field)
     entry = SampleEntry(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vhquad.errors import ConfigError
 from vhquad.field.cross import CrossField
-from vhquad.geometry.operators import OperatorSettings, build_operators
+from vhquad.geometry.operators import OperatorSettings, build_operators, load_or_build
 from vhquad.learn.augment import crop_height, deform, mirror
 from vhquad.learn.sources import Part
 from vhquad.learn.targets import make_target
@@ -117,9 +117,12 @@ def operator_settings(settings: PreprocessSettings) -> OperatorSettings:
     return OperatorSettings(k=settings.k, features=settings.features, turned=settings.turned)
 
 
-def operator_arrays(mesh: TriMesh, settings: PreprocessSettings) -> dict[str, NDArray[Any]]:
-    """Arrays of a sample that every mesh has."""
-    operators = build_operators(mesh, operator_settings(settings))
+def operator_arrays(
+    mesh: TriMesh, settings: PreprocessSettings, keep: bool
+) -> dict[str, NDArray[Any]]:
+    """Arrays of a sample that every mesh has; ``keep``: in the cache of ``predict`` as well."""
+    build = load_or_build if keep else build_operators
+    operators = build(mesh, operator_settings(settings))
     return {
         "vertices": mesh.vertices,
         "faces": mesh.faces,
