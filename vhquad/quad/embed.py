@@ -165,20 +165,22 @@ def _cover(
     seen = {tuple(row) for row in front.tolist()}
     layers = [front]
     while len(front):
-        p, f, turn = front[:, 0], front[:, 1], front[:, 2]
+        owner, f, spin = front[:, 0], front[:, 1], front[:, 2]
         shift = front[:, 3:5]
         following = []
-        for k in range(3):
-            h = 3 * f + k
-            a = rotate(seamless.uv[f, k], turn) + shift
-            b = rotate(seamless.uv[f, (k + 1) % 3], turn) + shift
-            ok = (mesh.twin[h] >= 0) & ~aligned.feature[h] & _meets(a, b, size[p])
-            h, q = h[ok], p[ok]
+        for side in range(3):
+            halves = 3 * f + side
+            a = rotate(seamless.uv[f, side], spin) + shift
+            b = rotate(seamless.uv[f, (side + 1) % 3], spin) + shift
+            ok = (mesh.twin[halves] >= 0) & ~aligned.feature[halves] & _meets(a, b, size[owner])
+            h_in, q = halves[ok], owner[ok]
             # z_patch = i^turn z_f + shift and z_g = i^r z_f + t give the neighbour's placement.
-            new_turn = (turn[ok] - seamless.rotation[h]) % 4
-            new_shift = shift[ok] - rotate(seamless.translation[h], new_turn)
+            new_turn = (spin[ok] - seamless.rotation[h_in]) % 4
+            new_shift = shift[ok] - rotate(seamless.translation[h_in], new_turn)
             following.append(
-                np.column_stack([q, mesh.twin[h] // 3, new_turn, new_shift[:, 0], new_shift[:, 1]])
+                np.column_stack(
+                    [q, mesh.twin[h_in] // 3, new_turn, new_shift[:, 0], new_shift[:, 1]]
+                )
             )
         rows = np.concatenate(following).tolist()
         fresh = []

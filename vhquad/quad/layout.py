@@ -74,7 +74,8 @@ class Layout:
     def grid(self, patch: int) -> Ints:
         """Lattice points of a patch as an (a + 1, b + 1) array, first index along side 0."""
         p = self.tmesh.patches[patch]
-        return _grid(*(_side_points(self, side) for side in p.sides), int(self.patch_offset[patch]))
+        bottom, right, top, left = (_side_points(self, side) for side in p.sides)
+        return _grid(bottom, right, top, left, int(self.patch_offset[patch]))
 
 
 def _side_points(layout: Layout, side: tuple[int, ...]) -> Ints:
@@ -140,8 +141,8 @@ def build_layout(tmesh: TMesh, lengths: Ints) -> Layout:
     graph = coo_matrix(
         (np.ones(len(link), dtype=np.int8), (link[:, 0], link[:, 1])), shape=(n_points, n_points)
     )
-    n_vertices, vertex_of = connected_components(graph, directed=False)
-    vertex_of = vertex_of.astype(np.int64)
+    n_vertices, label = connected_components(graph, directed=False)
+    vertex_of = np.asarray(label, dtype=np.int64)
     cells = np.concatenate(quads) if quads else np.zeros((0, 4), dtype=np.int64)
     return Layout(
         tmesh=tmesh,
@@ -151,7 +152,7 @@ def build_layout(tmesh: TMesh, lengths: Ints) -> Layout:
         n_points=n_points,
         vertex_of=vertex_of,
         n_vertices=int(n_vertices),
-        quads=vertex_of[cells],
+        quads=np.asarray(vertex_of[cells]),
         quad_patch=np.concatenate(owner) if owner else np.zeros(0, dtype=np.int64),
     )
 

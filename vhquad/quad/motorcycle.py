@@ -19,7 +19,7 @@ from vhquad.field.align import AlignedField
 from vhquad.quad.seamless import special_vertices
 from vhquad.quad.seamless_map import SeamlessMap
 
-__all__ = ["Hit", "Port", "Step", "Track", "Tracing", "trace"]
+__all__ = ["Hit", "Port", "Step", "Tracing", "Track", "trace"]
 
 
 @dataclass

@@ -155,10 +155,10 @@ def remesh_mesh(
     n_parts = mesh.n_components
     density = mesh.face_areas / size**2
     for number in range(n_parts):
-        report_progress = progress or (lambda step, share: None)
 
         def tell(step: str, share: float, number: int = number) -> None:
-            report_progress(step, (number + share) / n_parts)
+            if progress is not None:
+                progress(step, (number + share) / n_parts)
 
         inside = mesh.face_component == number
         part, used = mesh.submesh(inside)

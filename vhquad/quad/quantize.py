@@ -125,7 +125,9 @@ class _Program:
                 row += 1
         self.across = across
         shape = (row, self.size)
-        self.sides = coo_matrix((values, (rows, cols)), shape=shape, dtype=np.float64).tocsr()
+        self.sides = coo_matrix(
+            (np.array(values, dtype=np.float64), (rows, cols)), shape=shape
+        ).tocsr()
         self.sides.sum_duplicates()
         self.known: list[Condition] = []
         self.solver = highspy.Highs()
@@ -168,9 +170,9 @@ class _Program:
         columns = np.arange(len(cost), dtype=np.int32)
         self.solver.changeColsCost(len(cost), columns, cost)
         self._bound(np.zeros(self.size), np.full(self.size, np.inf))
-        right = -(self.sides @ base)
-        for row, value in enumerate(right.tolist()):
-            self.solver.changeRowBounds(row, value, value)
+        right = -np.asarray(self.sides @ base)
+        for row in range(len(right)):
+            self.solver.changeRowBounds(row, float(right[row]), float(right[row]))
         for number, condition in enumerate(self.known):
             self.solver.changeRowBounds(
                 self.sides.shape[0] + number, self._bound_of(condition), highspy.kHighsInf

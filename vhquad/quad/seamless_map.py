@@ -113,34 +113,34 @@ def solve_seamless_map(
     """
     space = seamless_space(aligned)
     problem = _Problem(aligned, space)
-    best: SeamlessMap | None = None
     solves = 0
+
+    def attempt(weight: Floats) -> tuple[Floats, SeamlessMap]:
+        nonlocal solves
+        solves += 1
+        unknowns = problem.solve(weight)
+        candidate = _snap(aligned, space, problem, unknowns, solves)
+        if on_solve is not None:
+            on_solve(solves, candidate.flips)
+        return unknowns, candidate
+
+    even = np.ones(aligned.mesh.n_faces)
+    first, best = attempt(even)
+    if best.is_valid:
+        return best
     for schedule in _SCHEDULES:
-        weight = np.ones(aligned.mesh.n_faces)
+        weight, unknowns = even, first
         least, waited = aligned.mesh.n_faces + 1, 0
-        for number in range(_SOLVES_EACH):
-            if number == 0 and best is not None:
-                weight = problem.stiffen(weight, first, schedule)  # the first solve is shared
-            unknowns = problem.solve(weight)
-            if best is None:
-                first = unknowns
-            solves += 1
-            candidate = _snap(aligned, space, problem, unknowns, solves)
-            if on_solve is not None:
-                on_solve(solves, candidate.flips)
-            if best is None or (candidate.flips, candidate.wrong_angles) < (
-                best.flips,
-                best.wrong_angles,
-            ):
-                best = candidate
+        for _ in range(_SOLVES_EACH):
+            weight = problem.stiffen(weight, unknowns, schedule)
+            unknowns, candidate = attempt(weight)
             if candidate.is_valid:
                 return candidate
+            best = min(best, candidate, key=lambda c: (c.flips, c.wrong_angles))
             waited = 0 if candidate.flips < least else waited + 1
             least = min(least, candidate.flips)
             if waited == _PATIENCE:
                 break
-            weight = problem.stiffen(weight, unknowns, schedule)
-    assert best is not None
     return best
 
 
@@ -199,12 +199,12 @@ class _Problem:
                 permc_spec="MMD_AT_PLUS_A",
                 diag_pivot_thresh=0.0,
                 options={"SymmetricMode": True},
-            ).solve(self.transpose @ right)
+            ).solve(np.asarray(self.transpose @ right))
         )
 
     def corners(self, unknowns: Floats) -> NDArray[np.complex128]:
         """Chart coordinates of the corners; (m, 3) complex."""
-        flat = self.basis @ unknowns
+        flat = np.asarray(self.basis @ unknowns)
         z = flat[0::2] + 1j * flat[1::2]
         return np.asarray(z[self.wedge])
 

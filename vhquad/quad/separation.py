@@ -141,7 +141,7 @@ def separation_conditions(layout: Layout, scaled: NDArray[np.float64]) -> list[C
             condition = _part(borders, label, members, g, group_of, scaled)
             if condition is not None:
                 found.append(condition)
-    unique = {c: None for c in found}
+    unique = dict.fromkeys(found)
     return list(unique)
 
 
