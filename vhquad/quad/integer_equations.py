@@ -21,7 +21,7 @@ from scipy.sparse.linalg import splu
 from vhquad.errors import ParametrizationError
 from vhquad.field.align import AlignedField
 from vhquad.mesh.triangle import next_halfedge
-from vhquad.quad.motorcycle import Track, Tracing
+from vhquad.quad.motorcycle import Tracing, Track
 from vhquad.quad.seamless import SeamlessSpace
 from vhquad.quad.seamless_map import SeamlessMap
 from vhquad.quad.tmesh import TMesh
@@ -90,7 +90,7 @@ class _Rows:
 
 def _matrix(parts: list[tuple[Ints, Ints, Ints]], shape: tuple[int, int]) -> csr_matrix:
     if not parts:
-        return csr_matrix(shape, dtype=np.int64)
+        parts = [(np.zeros(0, dtype=np.int64),) * 3]
     row, col, value = (np.concatenate([p[i] for p in parts]) for i in range(3))
     matrix = coo_matrix((value.astype(np.int64), (row, col)), shape=shape).tocsr()
     matrix.eliminate_zeros()
@@ -142,11 +142,7 @@ class _Surface:
         r = self.rotation[h]
         after = r.sum() - np.cumsum(r)
         near, far = self.wedge[h], self.wedge[next_halfedge(enter)]
-        cut = (
-            (r != 0)
-            | (near != far)
-            | (self.wedge[next_halfedge(h)] != self.wedge[enter])
-        )
+        cut = (r != 0) | (near != far) | (self.wedge[next_halfedge(h)] != self.wedge[enter])
         first = 3 * track.steps[0].face
         start = first + int(np.flatnonzero(self.mesh.tail[first : first + 3] == track.vertex)[0])
         # i^after (z_far - i^r z_near) for every crossing, and the origin turned by all of them.

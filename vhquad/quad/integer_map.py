@@ -117,11 +117,9 @@ def integer_map(
 
     basis = (space.basis / space.denominator).tocsr()
     transpose = basis.T.tocsr()
-    start = solve_positive(transpose @ basis, transpose @ flat.reshape(-1))
+    start = solve_positive(transpose @ basis, np.asarray(transpose @ flat.reshape(-1)))
     size = 1.0 if aligned.size is None else aligned.size
-    energy = MapEnergy(
-        aligned.mesh, space.wedge, basis, scale / size * np.exp(1j * space.angle)
-    )
+    energy = MapEnergy(aligned.mesh, space.wedge, basis, scale / size * np.exp(1j * space.angle))
     best: IntegerMap | None = None
     for unknowns in _attempts(energy, start, fixed, space.even, deadline):
         made = _snapped(aligned, space, fixed, unknowns)
