@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from vhquad.field.align import AlignedField
 from vhquad.quad.layout import Layout
@@ -19,6 +20,9 @@ __all__ = ["embed_layout"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+NEAR_TRIANGLES = 12
+CHUNK = 64  # points compared with every triangle of a patch at a time
 
 
 def embed_layout(layout: Layout, aligned: AlignedField, seamless: SeamlessMap) -> Floats:
@@ -114,25 +118,41 @@ def _fill(
     assert cover is not None
     faces, corners = cover
     mesh = aligned.mesh
-    chunk = max(1, 2_000_000 // len(faces))
-    for low in range(0, len(flat), chunk):
-        q = wanted[low : low + chunk]
-        weights = _barycentric(corners, q)
-        best = np.argmax(weights.min(axis=2), axis=1)
-        w = np.maximum(weights[np.arange(len(q)), best], 0.0)
-        w /= w.sum(axis=1, keepdims=True)
-        place = mesh.vertices[mesh.faces[faces[best]]]
-        points[flat[low : low + chunk]] = np.einsum("qk,qki->qi", w, place)
+    # The triangles with the nearest centres nearly always include the one around a point.
+    centre = corners.mean(axis=1)
+    near = min(NEAR_TRIANGLES, len(faces))
+    tree = cKDTree(np.column_stack([centre.real, centre.imag]))
+    found = tree.query(np.column_stack([wanted.real, wanted.imag]), k=near)[1]
+    place, weights = _containing(corners, wanted, found.reshape(len(wanted), near))
+    astray = np.flatnonzero(weights.min(axis=1) < -1e-9)
+    everything = np.arange(len(faces))[None]
+    for low in range(0, len(astray), CHUNK):
+        q = astray[low : low + CHUNK]
+        place[q], weights[q] = _containing(corners, wanted[q], everything.repeat(len(q), axis=0))
+    weights = np.maximum(weights, 0.0)
+    weights /= weights.sum(axis=1, keepdims=True)
+    at = mesh.vertices[mesh.faces[faces[place]]]
+    points[flat] = np.einsum("qk,qki->qi", weights, at)
+
+
+def _containing(
+    corners: NDArray[np.complex128], q: NDArray[np.complex128], candidates: Ints
+) -> tuple[Ints, Floats]:
+    """The candidate triangle that holds each point best, and barycentric coordinates in it."""
+    weights = _barycentric(corners[candidates], q)
+    best = np.argmax(weights.min(axis=2), axis=1)
+    rows = np.arange(len(q))
+    return candidates[rows, best], weights[rows, best]
 
 
 def _barycentric(corners: NDArray[np.complex128], q: NDArray[np.complex128]) -> Floats:
-    """Barycentric coordinates of every point in every triangle; (q, t, 3)."""
-    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    """Barycentric coordinates of each point in its candidate triangles; (q, t, 3)."""
+    a, b, c = corners[..., 0], corners[..., 1], corners[..., 2]
     e, g = b - a, c - a
     det = (e.conj() * g).imag
-    d = q[:, None] - a[None]
-    s = (d.conj() * g[None]).imag / det
-    t = (e.conj()[None] * d).imag / det
+    d = q[:, None] - a
+    s = (d.conj() * g).imag / det
+    t = (e.conj() * d).imag / det
     return np.stack([1 - s - t, s, t], axis=2)
 
 
