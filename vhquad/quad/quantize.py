@@ -125,9 +125,9 @@ class _Program:
                 row += 1
         self.across = across
         shape = (row, self.size)
-        self.sides = coo_matrix(
-            (np.array(values, dtype=np.float64), (rows, cols)), shape=shape
-        ).tocsr()
+        places = (np.array(rows), np.array(cols))
+        entries = np.array(values, dtype=np.float64)
+        self.sides = coo_matrix((entries, places), shape=shape).tocsr()
         self.sides.sum_duplicates()
         self.known: list[Condition] = []
         self.solver = highspy.Highs()
