@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import signal
+import time
 from pathlib import Path
 
 import pytest
 
-from tests.command_line import Invoke, write_obj
+from tests.command_line import Invoke, program, write_obj
 from tests.meshes import half_sphere, icosphere
 from tests.quad_meshes import cube_sphere, quad_torus
 
@@ -63,3 +65,13 @@ def test_refusals(invoke: Invoke, tmp_path: Path) -> None:
     assert invoke("train", empty, "--preset", "huge").refused("huge", "starter")
     assert invoke("train", empty, "--resume", "--rate", "1").refused("--resume", "--rate")
     assert invoke("train").code == 2
+
+
+def test_interrupted_preprocess_stops_its_workers(folder: Path) -> None:
+    """Ctrl-C reaches the whole group; nothing half written stays, no worker goes on."""
+    process = program("preprocess", folder, "--triangulations", "500", "--jobs", "2")
+    time.sleep(6.0)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)  # ends when the last worker has closed the pipes
+    assert (process.returncode, out, err) == (130, "", "vhquad: interrupted\n")
+    assert not list(folder.parent.rglob(".*.npz"))

@@ -13,6 +13,7 @@ from __future__ import annotations
 import hashlib
 import json
 import multiprocessing
+import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
@@ -164,20 +165,34 @@ def _run(jobs: list[_Job], workers: int) -> Iterator[_Done]:
         yield from map(_prepare, unique)
         return
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=_one_thread) as pool:
+    others = set(multiprocessing.active_children())
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=_start_worker) as pool:
         futures = [pool.submit(_prepare, job) for job in unique]
         try:
             for future in as_completed(futures):
                 yield future.result()
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
+            _stop(set(multiprocessing.active_children()) - others, unique[0].out)
             raise
 
 
-def _one_thread() -> None:
+def _start_worker() -> None:
+    """One thread a process; Ctrl-C is the parent's business, which then stops the workers."""
     import torch
 
     torch.set_num_threads(1)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _stop(workers: set[multiprocessing.process.BaseProcess], out: Path) -> None:
+    """End workers in the middle of their meshes, and remove what they had half written."""
+    for worker in workers:
+        worker.terminate()
+    for worker in workers:
+        worker.join()
+    for partial in (out / "samples").glob(".*.npz"):
+        partial.unlink(missing_ok=True)
 
 
 def _prepare(job: _Job) -> _Done:
