@@ -96,7 +96,11 @@ def preprocess(
         def on_source(name: str, done: int, count: int) -> None:
             progress("preparing", done / count, f"{done} of {count}, last {name}")
 
-        dataset = run(folder, target, settings, jobs or os.cpu_count() or 1, on_source)
+        try:
+            dataset = run(folder, target, settings, jobs or os.cpu_count() or 1, on_source)
+        except KeyboardInterrupt:
+            complain(f"stopped; the same command goes on from what is in {target}")
+            raise
     for source, reason in dataset.skipped:
         complain(f"skipped {source}: {reason}")
     from vhquad.cli.show import show_dataset
