@@ -35,9 +35,10 @@ Ints = NDArray[np.int64]
 SOLVES = 3  # stiffened linear solves before the careful way
 CAP = 1e3  # largest weight of a triangle in them
 LEAST_DETERMINANT = 0.1  # relative; triangles below are stiffened
-REACH = 0.7  # of the way to the first fold that a careful step goes
-CENTRING = 2  # Newton steps of the free unknowns after each step towards the integers
-SHORTEST = 1e-4  # of a careful step; below, a fold cannot be avoided
+REACH = 0.8  # of the way to the first fold that a careful step goes
+CENTRING = 1  # Newton steps of the free unknowns after each step towards the integers
+SHORTEST = 1e-4  # of a careful step; below, or where a triangle has lost almost all of its
+COLLAPSED = 1e-7  # area, a fold cannot be avoided
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,10 +182,9 @@ def _moved(
             move = energy.frames(step)
             length = min(1.0, REACH * largest_step(frames, move))
             if centring == 0:
-                if length < SHORTEST:
-                    return np.where(even, fixed, x)
-                x = x + length * step
-                if length == 1.0:
+                hopeless = length < SHORTEST or determinants(frames).min() < COLLAPSED
+                x = x if hopeless else x + length * step
+                if hopeless or length == 1.0:
                     return np.where(even, fixed, x)
                 continue
             before, along = energy.value(frames), float(slope @ move.ravel())
