@@ -9,6 +9,7 @@ from tests.field_checks import check_aligned
 from tests.meshes import blob, cone, grid, icosphere, torus
 from vhquad.field.align import AlignSettings, align_field
 from vhquad.field.cancel import (
+    absorb_at_features,
     cancel_pairs,
     cure_low_sectors,
     low_sectors,
@@ -134,3 +135,31 @@ def test_cancelling_is_reported_and_can_be_turned_off() -> None:
     assert abs(totals[0] - totals[1] - 2 * on.report.pairs_cancelled) <= 2 * (
         on.report.indices_moved + off.report.indices_moved
     )
+
+
+def test_a_singularity_beside_the_boundary_moves_on_to_it() -> None:
+    mesh = grid(12, 9)
+    field = parallel(mesh)
+    # A valence-5 vertex one row inside the straight lower side, its partner far away.
+    row_by_row = (61, 62, 63, 53, 43, 33, 34, 35, 36, 37)
+    path = np.array([sector_of(field, v) for v in row_by_row])
+    made = move_indices(field, [path])
+    assert made.sector_quads[path[0]] == 5
+    row = 0.75 / 9.0
+    # 1. out of reach: stays
+    assert absorb_at_features(made, 0.9 * row)[1] == 0
+    # 2. in reach: the boundary vertex below has three quads, the inner one is flat
+    moved, count = absorb_at_features(made, 1.1 * row)
+    assert count == 1
+    assert moved.sector_quads[path[0]] == 4
+    assert moved.sector_quads[sector_of(field, 60)] == 3
+    assert moved.sector_quads.sum() == made.sector_quads.sum()
+
+
+def test_no_quad_gets_a_straight_corner_by_absorbing() -> None:
+    field = parallel(grid(12, 9))
+    # A valence-3 vertex beside a straight side would leave one quad for 180 degrees there.
+    path = np.array([sector_of(field, v) for v in (61, 62, 63, 64, 65, 66)])
+    made = move_indices(field, [path[::-1]])
+    assert made.sector_quads[path[0]] == 3
+    assert absorb_at_features(made, 0.09)[1] == 0

@@ -12,19 +12,15 @@ from dataclasses import field as default
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import dijkstra
 
 from vhquad.errors import ConfigError, FieldError, MeshError
-from vhquad.field.boundary import BoundaryTangents, boundary_tangents
-from vhquad.field.cancel import cancel_pairs, cure_low_sectors, low_sectors
+from vhquad.field.cancel import absorb_at_features, cancel_pairs, cure_low_sectors, low_sectors
+from vhquad.field.constrained import pose
 from vhquad.field.cross import CrossField
-from vhquad.field.dual import face_angles
 from vhquad.field.features import crease_halfedges, hopeless_creases
-from vhquad.field.matching import MatchedField, match_field
+from vhquad.field.matching import MatchedField
 from vhquad.field.refine import Refinement, no_refinement, split_edges
 from vhquad.field.separate import separate_features, separate_singularities
-from vhquad.field.smooth import polish
 from vhquad.mesh.triangle import TriMesh
 
 __all__ = ["AlignReport", "AlignSettings", "AlignedField", "align_field"]
@@ -34,7 +30,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 SHORTEST_CREASE = 2.0  # edge lengths; of what is left where part of a crease was dropped
-TINY = 1e-9
+SETTLE = 2.0  # edge lengths over which singularities may drift to better places
 MOST_SPLITS = 12  # rounds of splitting where vertices are too few; one or two happen
 
 
@@ -50,7 +46,8 @@ class AlignSettings:
     smoothing : float
         Details of the field smaller than this many edge lengths are smoothed away.
     cancel : float
-        Opposite singularities closer than this many edge lengths are cancelled; 0 cancels none.
+        Opposite singularities closer than this many edge lengths are cancelled, and those as close
+        to a boundary or crease move on to it; 0 changes none.
     """
 
     edge_length: float | None = None
@@ -81,6 +78,8 @@ class AlignReport:
         Crease edges kept, and left out because no quad fits beside them.
     pairs_cancelled : int
         Pairs of opposite singularities taken out.
+    absorbed : int
+        Singularities moved on to a boundary or crease close by.
     indices_moved : int
         Quarter indices moved away from vertices that had too few quads.
     singularities : dict of int to int
@@ -93,6 +92,7 @@ class AlignReport:
     creases: int = 0
     creases_dropped: int = 0
     pairs_cancelled: int = 0
+    absorbed: int = 0
     indices_moved: int = 0
     singularities: dict[int, int] = default(default_factory=dict)
 
@@ -186,24 +186,28 @@ def align_field(
     n_creases = _count_creases(mesh, feature)
     while True:
         first = separate_features(mesh, feature)
-        matched, boundary = _solve(first, feature, field, length, settings)
-        blunt = hopeless_creases(matched, SHORTEST_CREASE * length)
+        posed = pose(first, feature, field, length, settings.smoothing * length)
+        z = posed.solve()
+        blunt = hopeless_creases(posed.match(z), SHORTEST_CREASE * length)
         if not blunt.any():
             break
         feature[first.source[blunt]] = False
+    matched = posed.match(posed.settle(z, SETTLE * length))
 
-    kept = boundary.corner | (matched.feature & (matched.mesh.twin >= 0))
+    kept = posed.corner | (matched.feature & (matched.mesh.twin >= 0))
     n_kept = _count_creases(mesh, feature)
     matched, cancelled = cancel_pairs(matched, settings.cancel * length, matched.touched(kept))
+    matched, absorbed = absorb_at_features(matched, settings.cancel * length)
     matched, room, moved = _cure(matched, settings.cancel * length)
     matched, last = separate_singularities(matched)
     report = AlignReport(
         edge_length=length,
         splits=matched.mesh.n_vertices - mesh.n_vertices,
-        corners=int(boundary.corner.sum()),
+        corners=int(posed.corner.sum()),
         creases=n_kept,
         creases_dropped=n_creases - n_kept,
         pairs_cancelled=cancelled,
+        absorbed=absorbed,
         indices_moved=moved,
         singularities=_singularities(matched),
     )
@@ -220,46 +224,6 @@ def _edge_length(mesh: TriMesh, field: CrossField, settings: AlignSettings) -> f
 
 def _count_creases(mesh: TriMesh, feature: Bools) -> int:
     return int((feature & (mesh.twin >= 0)).sum()) // 2
-
-
-def _solve(
-    refinement: Refinement,
-    feature: Bools,
-    field: CrossField,
-    length: float,
-    settings: AlignSettings,
-) -> tuple[MatchedField, BoundaryTangents]:
-    """The field polished and matched on the refined mesh; ``feature`` is of the input mesh."""
-    mesh = refinement.mesh
-    feature = refinement.carry(feature, False)
-    boundary = boundary_tangents(mesh, length)
-    on = np.flatnonzero(feature)
-    target = field.z[refinement.parent] * np.exp(-4j * refinement.turn)
-    target[on // 3] = np.exp(4j * (face_angles(mesh) + boundary.lean)[on])
-    fixed = np.zeros(mesh.n_faces, dtype=bool)
-    fixed[on // 3] = True
-    weight = mesh.face_areas / max(settings.smoothing * length, TINY * mesh.diagonal) ** 2
-    if field.confidence is not None:
-        weight = weight * field.confidence[refinement.parent]
-    weight = weight * (target != 0) * _distance_trust(mesh, on, length)
-    z = polish(mesh, target, weight, fixed)
-    return match_field(mesh, np.angle(z) / 4.0, feature, boundary.lean), boundary
-
-
-def _distance_trust(mesh: TriMesh, on: Ints, length: float) -> Floats:
-    """How far the given field counts: 0 at features, 1 from about an edge length on; (m,)."""
-    if on.size == 0:
-        return np.ones(mesh.n_faces)
-    h = np.arange(3 * mesh.n_faces)
-    inner = h[(mesh.twin < 0) | (h < mesh.twin)]
-    shape = (mesh.n_vertices, mesh.n_vertices)
-    lengths = mesh.edge_lengths.reshape(-1)[inner]
-    graph = csr_matrix((lengths, (mesh.tail[inner], mesh.head[inner])), shape)
-    start = np.unique(np.concatenate([mesh.tail[on], mesh.head[on]]))
-    limit = 4.0 * length
-    far = dijkstra(graph, directed=False, indices=start, limit=limit, min_only=True)
-    far = np.minimum(far, limit)[mesh.faces].mean(axis=1)
-    return np.asarray(1.0 - np.exp(-((far / length) ** 2)))
 
 
 def _cure(matched: MatchedField, distance: float) -> tuple[MatchedField, Refinement, int]:

@@ -21,13 +21,22 @@ from vhquad.field.matching import QUARTER, MatchedField
 from vhquad.field.smooth import factorized
 from vhquad.mesh.triangle import next_halfedge
 
-__all__ = ["cancel_pairs", "cure_low_sectors", "low_sectors", "move_indices", "relax"]
+__all__ = [
+    "absorb_at_features",
+    "cancel_pairs",
+    "cure_low_sectors",
+    "low_sectors",
+    "move_indices",
+    "relax",
+]
 
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 LEAST_PLAIN = 3  # fewer quads around an interior vertex would make doublets
 LEAST_FEATURE = 1
+LEAST_CORNER = np.radians(50.0)  # of a quad at a feature that takes a singularity
+MOST_CORNER = np.radians(130.0)
 CHUNK = 64
 
 
@@ -93,28 +102,53 @@ def cancel_pairs(matched: MatchedField, distance: float, kept: Bools) -> tuple[M
     """
     lacking = np.where(matched.sector_is_feature, 2, 4) - matched.sector_quads
     lacking[kept] = 0
-    graph = _sector_links(matched, matched.mesh.edge_lengths.reshape(-1))
-    found: list[tuple[float, Ints]] = []
-    sources = np.flatnonzero(lacking > 0)
-    sinks = np.flatnonzero(lacking < 0)
-    for start in range(0, len(sources), CHUNK):
-        some = sources[start : start + CHUNK]
-        far, before = dijkstra(graph, indices=some, limit=distance, return_predecessors=True)
-        for row, column in np.argwhere(np.isfinite(far[:, sinks])):
-            path = _trace(before[row], int(sinks[column]))
-            found.append((float(far[row, sinks[column]]), path))
-    found.sort(key=lambda pair: pair[0])
     paths = []
-    for _, path in found:
+    for path in _near_pairs(matched, lacking > 0, lacking < 0, distance):
         first, last = path[0], path[-1]
         while lacking[first] > 0 > lacking[last]:
             lacking[first] -= 1
             lacking[last] += 1
             paths.append(path)
-    if not paths:
-        return matched, 0
-    moved = move_indices(matched, paths)
-    return relax(moved, _around(moved, np.unique(np.concatenate(paths)), distance)), len(paths)
+    return _moved(matched, paths, distance), len(paths)
+
+
+def absorb_at_features(matched: MatchedField, distance: float) -> tuple[MatchedField, int]:
+    """Move singularities on to a boundary or crease nearer than a distance, where they fit.
+
+    In the quads to come a singularity is at least one quad away from a feature that it does not
+    lie on, so one much closer would spread the map there. A sector may take it if its quads then
+    have corners between 50 and 130 degrees, and if no other singular vertex of a feature is near.
+
+    Parameters
+    ----------
+    matched : MatchedField
+    distance : float
+
+    Returns
+    -------
+    matched : MatchedField
+    count : int
+        Quarter indices moved.
+    """
+    quads, feature = matched.sector_quads.copy(), matched.sector_is_feature
+    angle = np.bincount(matched.corner_sector, matched.mesh.corner_angles.reshape(-1))
+    roomy = feature & (quads == 2) & (angle >= 3 * LEAST_CORNER)
+    tight = feature & (quads == 2) & (angle <= MOST_CORNER)
+    found = [(path, 1) for path in _near_pairs(matched, roomy, ~feature & (quads > 4), distance)]
+    found += [(path, -1) for path in _near_pairs(matched, tight, ~feature & (quads < 4), distance)]
+    place = matched.mesh.vertices[matched.sector_vertex]
+    taken = list(np.flatnonzero(feature & (quads != 2)))
+    paths = []
+    for path, change in found:
+        sink, source = path[0], path[-1]
+        gap = np.linalg.norm(place[taken] - place[sink], axis=1)
+        if quads[source] * change <= 4 * change or (gap < distance).any():
+            continue
+        quads[sink] += change
+        quads[source] -= change
+        taken.append(sink)
+        paths.append(path if change > 0 else path[::-1])
+    return _moved(matched, paths, distance), len(paths)
 
 
 def cure_low_sectors(matched: MatchedField, distance: float) -> tuple[MatchedField, int]:
@@ -150,16 +184,38 @@ def cure_low_sectors(matched: MatchedField, distance: float) -> tuple[MatchedFie
             paths.append(_trace(before[0], giver))
             quads[sector] += 1
             quads[giver] -= 1
-    if not paths:
-        return matched, 0
-    moved = move_indices(matched, paths)
-    return relax(moved, _around(moved, np.unique(np.concatenate(paths)), distance)), len(paths)
+    return _moved(matched, paths, distance), len(paths)
 
 
 def low_sectors(matched: MatchedField) -> Bools:
     """Which sectors have fewer quads than they need; (s,)."""
     least = np.where(matched.sector_is_feature, LEAST_FEATURE, LEAST_PLAIN)
     return np.asarray(matched.sector_quads < least)
+
+
+def _near_pairs(matched: MatchedField, start: Bools, end: Bools, distance: float) -> list[Ints]:
+    """Shortest paths from sectors of one kind to those of another within a distance, by length."""
+    graph = _sector_links(matched, matched.mesh.edge_lengths.reshape(-1))
+    sources, sinks = np.flatnonzero(start), np.flatnonzero(end)
+    if sources.size > sinks.size:
+        return [path[::-1] for path in _near_pairs(matched, end, start, distance)]
+    found: list[tuple[float, Ints]] = []
+    for first in range(0, len(sources), CHUNK):
+        some = sources[first : first + CHUNK]
+        far, before = dijkstra(graph, indices=some, limit=distance, return_predecessors=True)
+        for row, column in np.argwhere(np.isfinite(far[:, sinks])):
+            path = _trace(before[row], int(sinks[column]))
+            found.append((float(far[row, sinks[column]]), path))
+    found.sort(key=lambda pair: pair[0])
+    return [path for _, path in found]
+
+
+def _moved(matched: MatchedField, paths: list[Ints], distance: float) -> MatchedField:
+    """Indices moved along paths, and the crosses around them relaxed."""
+    if not paths:
+        return matched
+    moved = move_indices(matched, paths)
+    return relax(moved, _around(moved, np.unique(np.concatenate(paths)), distance))
 
 
 def _giver(matched: MatchedField, quads: Ints, far: NDArray[np.float64], distance: float) -> int:

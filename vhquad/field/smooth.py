@@ -17,12 +17,13 @@ from scipy.sparse.linalg import splu
 from vhquad.field.dual import carry4, dirichlet, dual_weights
 from vhquad.mesh.triangle import TriMesh
 
-__all__ = ["factorized", "polish", "relaxed", "smoothest", "unit"]
+__all__ = ["factorized", "polish", "relaxed", "settled", "smoothest", "unit"]
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 INVERSE_ITERATIONS = 20
+SETTLING_STEPS = 5
 
 
 def smoothest(mesh: TriMesh, seed: int = 0) -> Complexes:
@@ -85,6 +86,46 @@ def relaxed(
         matrix = rows[:, free] + diags(weight[free])
         pull = weight[free] * target[free] - rows @ np.where(fixed, target, 0.0)
         z[free] = factorized(matrix)(pull)
+    return z
+
+
+def settled(
+    mesh: TriMesh,
+    z: Complexes,
+    target: Complexes,
+    weight: Floats,
+    fixed: NDArray[np.bool_],
+    length: float,
+) -> Complexes:
+    """Lower the energy of unit crosses among unit crosses, by diffusing and normalising in turn.
+
+    :func:`relaxed` lets crosses shrink where they disagree, so its singularities gather where there
+    is nothing to say; here they repel each other and drift to better places.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+    z : (m,) complex128
+        Unit crosses to start from.
+    target, weight, fixed
+        As in :func:`relaxed`.
+    length : float
+        Diffusion length of a step.
+
+    References
+    ----------
+    Viertel and Osting 2019, "An approach to quad meshing based on harmonic cross-valued maps".
+    """
+    free = np.flatnonzero(~fixed)
+    z = z.copy()
+    if free.size == 0:
+        return z
+    rows = _energy(mesh)[free]
+    pull = weight[free] * target[free] - rows @ np.where(fixed, target, 0.0)
+    hold = mesh.face_areas[free] / length**2
+    solve = factorized(rows[:, free] + diags(weight[free] + hold))
+    for _ in range(SETTLING_STEPS):
+        z[free] = unit(solve(pull + hold * z[free]))
     return z
 
 

@@ -1,0 +1,121 @@
+"""A field bent to features: along boundaries and creases exactly, near the given one elsewhere.
+
+Feature faces get the direction of their edge. On the others the given cross counts by its
+confidence, the more the farther from features, against the smoothness of the whole
+(``vhquad.field.smooth``).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from vhquad.field.boundary import boundary_tangents
+from vhquad.field.cross import CrossField
+from vhquad.field.dual import face_angles
+from vhquad.field.matching import MatchedField, match_field
+from vhquad.field.refine import Refinement
+from vhquad.field.smooth import relaxed, settled, unit
+from vhquad.mesh.triangle import TriMesh
+
+__all__ = ["Posed", "pose"]
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+LEAST_SMOOTHING = 1e-9  # of the mesh's diagonal
+REACH = 4.0  # edge lengths beyond which features do not weaken the given field
+
+
+@dataclass(frozen=True, eq=False)
+class Posed:
+    """A smoothing problem on a mesh whose features are separated.
+
+    Attributes
+    ----------
+    mesh : TriMesh
+    feature : (3m,) bool
+    lean : (3m,) float64
+        As in :class:`vhquad.field.matching.MatchedField`.
+    corner : (3m,) bool
+        Boundary halfedges that start where the boundary turns.
+    target : (m,) complex128
+        Crosses to stay near, or, where ``fixed``, to keep.
+    weight : (m,) float64
+        Of staying near.
+    fixed : (m,) bool
+    """
+
+    mesh: TriMesh
+    feature: Bools
+    lean: Floats
+    corner: Bools
+    target: Complexes
+    weight: Floats
+    fixed: Bools
+
+    def solve(self) -> Complexes:
+        """The crosses of least energy, unit; (m,)."""
+        return unit(relaxed(self.mesh, self.target, self.weight, self.fixed))
+
+    def settle(self, z: Complexes, length: float) -> Complexes:
+        """Crosses of less energy near unit ones, singularities moved by about ``length``; (m,)."""
+        return settled(self.mesh, z, self.target, self.weight, self.fixed, length)
+
+    def match(self, z: Complexes) -> MatchedField:
+        """Crosses with their matchings."""
+        return match_field(self.mesh, np.angle(z) / 4.0, self.feature, self.lean)
+
+
+def pose(
+    refinement: Refinement, feature: Bools, field: CrossField, edge_length: float, detail: float
+) -> Posed:
+    """Set up the problem.
+
+    Parameters
+    ----------
+    refinement : Refinement
+        Of the mesh of ``field``, its features separated.
+    feature : (3m,) bool
+        Halfedges of that mesh on boundaries and creases.
+    field : CrossField
+        On its faces.
+    edge_length : float
+        Of the quads to come.
+    detail : float
+        Details of the field smaller than this are smoothed away.
+    """
+    mesh = refinement.mesh
+    feature = refinement.carry(feature, False)
+    boundary = boundary_tangents(mesh, edge_length)
+    on = np.flatnonzero(feature)
+    target = field.z[refinement.parent] * np.exp(-4j * refinement.turn)
+    target[on // 3] = np.exp(4j * (face_angles(mesh) + boundary.lean)[on])
+    fixed = np.zeros(mesh.n_faces, dtype=bool)
+    fixed[on // 3] = True
+    weight = mesh.face_areas / max(detail, LEAST_SMOOTHING * mesh.diagonal) ** 2
+    if field.confidence is not None:
+        weight = weight * field.confidence[refinement.parent]
+    weight = weight * (target != 0) * _distance_trust(mesh, on, edge_length)
+    return Posed(mesh, feature, boundary.lean, boundary.corner, target, weight, fixed)
+
+
+def _distance_trust(mesh: TriMesh, on: Ints, length: float) -> Floats:
+    """How far the given field counts: 0 at features, 1 from about an edge length on; (m,)."""
+    if on.size == 0:
+        return np.ones(mesh.n_faces)
+    h = np.arange(3 * mesh.n_faces)
+    once = h[(mesh.twin < 0) | (h < mesh.twin)]
+    shape = (mesh.n_vertices, mesh.n_vertices)
+    lengths = mesh.edge_lengths.reshape(-1)[once]
+    graph = csr_matrix((lengths, (mesh.tail[once], mesh.head[once])), shape)
+    start = np.unique(np.concatenate([mesh.tail[on], mesh.head[on]]))
+    far = dijkstra(graph, directed=False, indices=start, limit=REACH * length, min_only=True)
+    far = np.minimum(far, REACH * length)[mesh.faces].mean(axis=1)
+    return np.asarray(1.0 - np.exp(-((far / length) ** 2)))
