@@ -32,9 +32,10 @@ __all__ = ["IntegerMap", "integer_map"]
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-SOLVES = 3  # stiffened linear solves before the careful way
-CAP = 1e3  # largest weight of a triangle in them
-LEAST_DETERMINANT = 0.1  # relative; triangles below are stiffened
+SOLVES = 8  # stiffened linear solves at most, as long as each halves the folds
+LEAST_DETERMINANT = 0.1  # relative area; triangles below are stiffened
+STIFFER = 3.0  # by this factor
+CAP = 1e6
 REACH = 0.8  # of the way to the first fold that a careful step goes
 CENTRING = 1  # Newton steps of the free unknowns after each step towards the integers
 SHORTEST = 1e-4  # of a careful step; below, or where a triangle has lost almost all of its
@@ -139,22 +140,19 @@ def _attempts(
     x = np.where(even, fixed, start)
     free = np.flatnonzero(~even)
     weight = np.ones(energy.mesh.n_faces)
+    least = energy.mesh.n_faces
     for _ in range(SOLVES):
         x = energy.least_squares(weight, x, free)
         yield x
+        area = determinants(energy.frames(x))
+        folds = int((area <= 0).sum())
         if time.monotonic() > deadline:
             return
-        weight = _stiffer(energy, weight, x)
+        if folds > least // 2:
+            break
+        least = folds
+        weight = np.where(area < LEAST_DETERMINANT, np.minimum(STIFFER * weight, CAP), weight)
     yield _moved(energy, start, fixed, even, deadline)
-
-
-def _stiffer(energy: MapEnergy, weight: Floats, x: Floats) -> Floats:
-    """Doubled weights on nearly folded triangles and the ring around them."""
-    bad = determinants(energy.frames(x)) < LEAST_DETERMINANT
-    touched = np.zeros(energy.mesh.n_vertices, dtype=bool)
-    touched[energy.mesh.faces[bad]] = True
-    near = touched[energy.mesh.faces].any(axis=1)
-    return np.where(near, np.minimum(2 * weight, CAP), weight)
 
 
 def _moved(
