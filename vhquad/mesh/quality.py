@@ -164,7 +164,8 @@ def flipped_quads(mesh: QuadMesh, surface: ClosestPoints) -> Ints:
 
     The surface's normal at the point closest to the quad's middle decides; where it is more than
     60 degrees off, so do those at four points half way to the corners, which spares quads across
-    a crease.
+    a crease. Where two sheets nearly touch, as at lips, the nearest one may be the other: the
+    corners, which lie on their own sheet, must face against the surface as well.
 
     Parameters
     ----------
@@ -186,7 +187,9 @@ def flipped_quads(mesh: QuadMesh, surface: ClosestPoints) -> Ints:
     around = 0.5 * (p[doubt] + middle[doubt, None])
     face = surface.query(around.reshape(-1, 3)).face.reshape(-1, 4)
     beneath = beneath[doubt] + normal[face].sum(axis=1)
-    return doubt[np.einsum("qi,qi->q", beneath, own[doubt]) < 0]
+    doubt = doubt[np.einsum("qi,qi->q", beneath, own[doubt]) < 0]
+    face = surface.query(p[doubt].reshape(-1, 3)).face.reshape(-1, 4)
+    return doubt[np.einsum("qi,qi->q", normal[face].sum(axis=1), own[doubt]) < 0]
 
 
 def _area_vectors(mesh: QuadMesh) -> Floats:
