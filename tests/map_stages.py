@@ -103,7 +103,7 @@ BUILDERS: dict[str, Callable[[], Stages]] = {
     "blob": lambda: made(meshes.blob(3)),
     "torus": _smooth_torus,
     "bad_torus": lambda: made(meshes.torus()),
-    "pretzel": lambda: made(meshes.pretzel()),
+    "pretzel": lambda: made(meshes.pretzel(), crease=None),
     "cube": lambda: made(meshes.cube(4)),
     "plate": lambda: made(meshes.plate_with_holes(2, 2)),
     "plain_cube": lambda: made(meshes.cube(4), crease=None),

@@ -67,7 +67,7 @@ def eliminate(
                 in_tree[number] = True
                 root[y], sign[y] = root[x], sign[x] * s
                 if t < 0:
-                    shift[y] = shift[x]
+                    shift[y] = {k: s * c for k, c in shift[x].items()}
                 elif x == a:  # y = s x + t
                     shift[y] = _plus({k: s * c for k, c in shift[x].items()}, t, 1)
                 else:  # x = s y + t, so y = s x - s t
