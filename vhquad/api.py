@@ -24,7 +24,8 @@ from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.quality import check_quads
 from vhquad.mesh.repair import repair
 from vhquad.mesh.triangle import TriMesh
-from vhquad.quad.pipeline import SIZE_RANGE, RemeshResult, RemeshSettings, remesh_mesh
+from vhquad.quad.pipeline import RemeshResult, RemeshSettings, remesh_mesh
+from vhquad.quad.sizing import SIZE_RANGE
 from vhquad.report import CheckReport, FieldReport, MeshCounts
 
 if TYPE_CHECKING:
@@ -175,6 +176,7 @@ def remesh_with(
     settings: RemeshSettings | None = None,
     *,
     creases: ArrayLike | None = None,
+    with_uv: bool = False,
     repair_lines: Sequence[str] = (),
     seconds: Mapping[str, float] | None = None,
     progress: Progress | None = None,
@@ -189,6 +191,8 @@ def remesh_with(
     settings : RemeshSettings, optional
     creases : (k, 2) array_like, optional
         Vertex pairs of edges to keep, beside those that the settings find.
+    with_uv : bool
+        Make the integer-grid map on the triangles as well.
     repair_lines : sequence of str
         What was repaired.
     seconds : dict, optional
@@ -199,7 +203,7 @@ def remesh_with(
     -------
     RemeshResult
     """
-    result = remesh_mesh(mesh, field, settings, creases=creases, progress=progress)
+    result = remesh_mesh(mesh, field, settings, creases=creases, with_uv=with_uv, progress=progress)
     report = replace(
         result.report,
         repair=(*repair_lines, *result.report.repair),

@@ -198,6 +198,7 @@ def remesh(
             cross,
             settings,
             creases=_given_creases(loaded, angle, sharp),
+            with_uv=uv_out is not None,
             repair_lines=loaded.lines(),
             seconds=seconds,
             progress=progress,
@@ -233,6 +234,8 @@ def _write_uv(path: Path, result: RemeshResult) -> None:
         warn(f"{path} was not written: some component has no integer-grid map (see the report)")
         return
     write_obj_with_uv(path, result.uv.mesh, result.uv.uv)
+    if result.uv.flips:
+        warn(f"{path}: {result.uv.flips} triangles of the map are folded; ask for more quads")
 
 
 def _judge(loaded: LoadedMesh, result: RemeshResult) -> None:

@@ -29,22 +29,22 @@ from vhquad.mesh.triangle import TriMesh
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.embed import embed_layout
 from vhquad.quad.fallback import triangles_to_quads
+from vhquad.quad.integer_map import integer_map
 from vhquad.quad.layout import Layout
-from vhquad.quad.motorcycle import trace
+from vhquad.quad.motorcycle import Tracing, trace
 from vhquad.quad.quantize import quantise
-from vhquad.quad.seamless_map import solve_seamless_map
+from vhquad.quad.seamless_map import SeamlessMap, solve_seamless_map
+from vhquad.quad.sizing import checked_density, wanted_sizes
 from vhquad.quad.smooth import smooth_quads
+from vhquad.quad.symmetric import SYMMETRIES, Parts, find_plane, remesh_mirrored
 from vhquad.quad.tmesh import build_tmesh
-from vhquad.report import ComponentReport, MeshCounts, RemeshReport
+from vhquad.report import ComponentReport, MeshCounts, RemeshReport, SymmetryReport
 
-__all__ = ["RemeshResult", "RemeshSettings", "remesh_mesh"]
+__all__ = ["RemeshResult", "RemeshSettings", "UvMap", "remesh_mesh"]
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-DEFAULT_QUADS = 4000  # where neither a count nor a size is given
 LEAST_QUADS = 6
-SIZE_RANGE = 8.0  # sizes are kept within this factor of their median
 NEAR_COUNT = 1.10
 
 Progress = Callable[[str, float], None]
@@ -64,6 +64,9 @@ class RemeshSettings:
         Edges sharper than this angle (degrees) become edges of quads; None for none.
     adaptivity : float
         0 for uniform quads, 1 for the sizes of the field, anything between.
+    symmetry : str
+        "x", "y" or "z" for quads that are their own mirror image in the best plane across that
+        axis, "auto" for the best plane of all, if the mesh has one, "off".
     seed : int
         Recorded in the report; the same input, settings and seed give the same quads.
     """
@@ -72,6 +75,7 @@ class RemeshSettings:
     edge_length: float | None = None
     crease: float | None = 40.0
     adaptivity: float = 1.0
+    symmetry: str = "off"
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -85,14 +89,65 @@ class RemeshSettings:
             raise ConfigError(f"--crease must lie between 0 and 180 degrees, not {self.crease}")
         if not 0 <= self.adaptivity <= 1:
             raise ConfigError(f"--adaptivity must lie between 0 and 1, not {self.adaptivity}")
+        if self.symmetry not in SYMMETRIES:
+            raise ConfigError(
+                f"--symmetry must be one of {', '.join(SYMMETRIES)}, not {self.symmetry!r}"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class UvMap:
+    """An integer-grid map of the input: its integer isolines are the edges of the quads.
+
+    Attributes
+    ----------
+    mesh : TriMesh
+        The input, refined where the map needs it.
+    uv : (m, 3, 2) float64
+        Coordinates of each corner, in quad edges.
+    flips : int
+        Triangles that the map folds, none but at coarse targets.
+    """
+
+    mesh: TriMesh
+    uv: Floats
+    flips: int
 
 
 @dataclass(frozen=True, eq=False)
 class RemeshResult:
-    """Quads, and the report of how they were made."""
+    """Quads, the report of how they were made, and their map on the input if it was asked for."""
 
     quads: QuadMesh
     report: RemeshReport
+    uv: UvMap | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """The quads of one component, how they were made, and their map if asked for."""
+
+    quads: QuadMesh
+    report: ComponentReport
+    uv: UvMap | None
+
+
+@dataclass(frozen=True, eq=False)
+class _Mapped:
+    """Quads from a map, with what made them."""
+
+    quads: QuadMesh
+    aligned: AlignedField
+    seamless: SeamlessMap
+    tracing: Tracing
+    layout: Layout
+
+    def uv(self) -> UvMap:
+        """The integer-grid map of the layout."""
+        made = integer_map(
+            self.aligned, self.seamless, self.tracing, self.layout.tmesh, self.layout
+        )
+        return UvMap(made.mesh, made.uv, made.flips)
 
 
 @dataclass
@@ -116,6 +171,7 @@ def remesh_mesh(
     settings: RemeshSettings | None = None,
     *,
     creases: ArrayLike | None = None,
+    density: ArrayLike | None = None,
     progress: Progress | None = None,
 ) -> RemeshResult:
     """Quads along a cross field.
@@ -129,6 +185,9 @@ def remesh_mesh(
     settings : RemeshSettings, optional
     creases : (k, 2) array_like of int, optional
         Edges that quads must follow, instead of those found by angle.
+    density : (n,) array_like, optional
+        Factor on the quads per area at each vertex, positive; twice the density makes edges
+        shorter by the root of two. With a count asked for only ratios matter.
     progress : callable, optional
         Called with (step, share done).
 
@@ -136,6 +195,10 @@ def remesh_mesh(
     ------
     FieldError
         If the field does not fit the mesh.
+    ConfigError
+        If the density does not.
+    MeshError
+        If a symmetry is asked for whose plane leaves no half to mirror.
     """
     settings = settings or RemeshSettings()
     watch = _Watch()
@@ -147,13 +210,80 @@ def remesh_mesh(
         field = to_faces(mesh, field)
     if len(field) != mesh.n_faces:
         raise FieldError(f"the field has {len(field)} crosses, the mesh {mesh.n_faces} faces")
-    size, asked = _sizes(mesh, field, settings)
+    size, asked = wanted_sizes(
+        mesh,
+        field,
+        adaptivity=settings.adaptivity,
+        density=None if density is None else checked_density(density, mesh.n_vertices),
+        target_quads=settings.target_quads,
+        edge_length=settings.edge_length,
+    )
     field = replace(field, size=size)
     given = None if creases is None else np.asarray(creases, dtype=np.int64).reshape(-1, 2)
-    quads: list[QuadMesh] = []
-    reports: list[ComponentReport] = []
-    n_parts = mesh.n_components
+    result, reports, symmetry = _remesh(mesh, field, given, settings, watch, progress)
+    with watch("check"):
+        quality = check_quads(result, mesh)
+    seconds = dict(watch.seconds)
+    for report in reports:
+        for step, value in report.seconds.items():
+            seconds[step] = seconds.get(step, 0.0) + value
+    return RemeshResult(
+        quads=result,
+        report=RemeshReport(
+            asked=asked,
+            made=result.n_quads,
+            input=MeshCounts.of(mesh),
+            output=MeshCounts.of(result),
+            quality=quality,
+            components=tuple(reports),
+            symmetry=symmetry,
+            seconds=seconds,
+            settings={
+                name: getattr(settings, name) for name in RemeshSettings.__dataclass_fields__
+            },
+        ),
+    )
+
+
+def _remesh(
+    mesh: TriMesh,
+    field: CrossField,
+    given: Ints | None,
+    settings: RemeshSettings,
+    watch: _Watch,
+    progress: Progress | None,
+) -> tuple[QuadMesh, list[ComponentReport], SymmetryReport | None]:
+    """Quads of the whole mesh; of one half and its mirror image, if there is a plane for it."""
+
+    def remesh_parts(half: TriMesh, own: CrossField, creases: Ints | None) -> Parts:
+        return _remesh_parts(half, own, creases, settings.crease, progress)
+
+    symmetry: SymmetryReport | None = None
+    if settings.symmetry != "off":
+        with watch("symmetry"):
+            plane, symmetry = find_plane(mesh, settings.symmetry)
+        if plane is not None:
+            try:
+                quads, doubled, reports = remesh_mirrored(mesh, field, given, plane, remesh_parts)
+                return quads, reports, replace(symmetry, doubled=doubled)
+            except ParametrizationError as problem:
+                symmetry = symmetry.given_up(str(problem))
+    parts = remesh_parts(mesh, field, given)
+    return parts.joined(), parts.reports, symmetry
+
+
+def _remesh_parts(
+    mesh: TriMesh,
+    field: CrossField,
+    given: Ints | None,
+    angle: float | None,
+    progress: Progress | None,
+) -> Parts:
+    """Quads of every component by itself; the field has the sizes wanted."""
+    size = np.ones(mesh.n_faces) if field.size is None else field.size
     density = mesh.face_areas / size**2
+    parts = Parts([], [])
+    n_parts = mesh.n_components
     for number in range(n_parts):
 
         def tell(step: str, share: float, number: int = number) -> None:
@@ -175,61 +305,10 @@ def remesh_mesh(
             None if field.confidence is None else field.confidence[inside],
         )
         target = max(round(float(density[inside].sum())), LEAST_QUADS)
-        made, report = _remesh_part(part, part_field, own, settings.crease, target, tell)
-        quads.append(made)
-        reports.append(report)
-    result = _joined(quads)
-    with watch("check"):
-        quality = check_quads(result, mesh)
-    seconds = dict(watch.seconds)
-    for report in reports:
-        for step, value in report.seconds.items():
-            seconds[step] = seconds.get(step, 0.0) + value
-    return RemeshResult(
-        quads=result,
-        report=RemeshReport(
-            asked=asked,
-            made=result.n_quads,
-            input=MeshCounts.of(mesh),
-            output=MeshCounts.of(result),
-            quality=quality,
-            components=tuple(reports),
-            seconds=seconds,
-            settings={
-                name: getattr(settings, name) for name in RemeshSettings.__dataclass_fields__
-            },
-        ),
-    )
-
-
-def _sizes(mesh: TriMesh, field: CrossField, settings: RemeshSettings) -> tuple[Floats, int]:
-    """Wanted edge length of each face and the number of quads that these amount to."""
-    if field.size is None or not (field.size > 0).any():
-        size = np.ones(mesh.n_faces)
-        native = None
-    else:
-        middle = float(np.median(field.size[field.size > 0]))
-        size = np.where(field.size > 0, field.size, middle)
-        size = np.clip(size, middle / SIZE_RANGE, middle * SIZE_RANGE)
-        native = float((mesh.face_areas / size**2).sum())
-        mean = np.exp(np.average(np.log(size), weights=mesh.face_areas + 1e-300))
-        size = mean * (size / mean) ** settings.adaptivity
-    if settings.target_quads is not None:
-        target = float(settings.target_quads)
-    elif settings.edge_length is not None:
-        target = mesh.area / settings.edge_length**2
-    else:
-        target = native if native is not None else float(DEFAULT_QUADS)
-    count = float((mesh.face_areas / size**2).sum())
-    return size * np.sqrt(count / target), max(round(target), 1)
-
-
-def _joined(parts: list[QuadMesh]) -> QuadMesh:
-    offset = np.cumsum([0, *(part.n_vertices for part in parts)])
-    return QuadMesh(
-        np.concatenate([part.vertices for part in parts]),
-        np.concatenate([part.quads + o for part, o in zip(parts, offset[:-1], strict=True)]),
-    )
+        made, report = _remesh_part(part, part_field, own, angle, target, tell)
+        parts.quads.append(made)
+        parts.reports.append(report)
+    return parts
 
 
 @dataclass(frozen=True)
@@ -272,36 +351,42 @@ def _remesh_part(
     given: Ints | None,
     angle: float | None,
     target: int,
+    with_uv: bool,
     tell: Progress,
-) -> tuple[QuadMesh, ComponentReport]:
+) -> _Part:
     """Quads of one component by the first attempt that gives a valid mesh of about the count."""
     watch = _Watch()
     surface = ClosestPoints(mesh)
     length = float(np.sqrt(mesh.area / target))
     reasons: list[str] = []
-    best: tuple[float, QuadMesh, AlignedField, str] | None = None
+    best: tuple[float, _Mapped, str] | None = None
     for attempt in _ATTEMPTS:
         creases = attempt.creases(mesh, given, angle, length)
         try:
-            quads, aligned = _by_map(mesh, field, creases, target, attempt, surface, watch, tell)
+            mapped = _by_map(mesh, field, creases, target, attempt, surface, watch, tell)
         except (ParametrizationError, FieldError) as problem:
             reasons.append(str(problem))
             continue
-        miss = abs(np.log(quads.n_quads / target))
+        miss = abs(np.log(mapped.quads.n_quads / target))
         if best is None or miss < best[0]:
-            best = (miss, quads, aligned, attempt.name)
+            best = (miss, mapped, attempt.name)
         if miss <= np.log(NEAR_COUNT):
             break
-        reasons.append(f"{quads.n_quads} quads where {target} were asked for")
+        reasons.append(f"{mapped.quads.n_quads} quads where {target} were asked for")
+    uv: UvMap | None = None
     if best is not None:
-        _, quads, aligned, method = best
-        singularities, cancelled = aligned.report.singularities, aligned.report.pairs_cancelled
+        _, mapped, method = best
+        quads, done = mapped.quads, mapped.aligned.report
+        singularities, cancelled = done.singularities, done.pairs_cancelled
+        if with_uv:
+            with watch("integer-grid map"):
+                uv = mapped.uv()
     else:
         with watch("fallback"):
             quads = triangles_to_quads(mesh, target, angle=field.angle)
         method, singularities, cancelled = "paired triangles", {}, 0
     tell("done", 1.0)
-    return quads, ComponentReport(
+    report = ComponentReport(
         vertices=mesh.n_vertices,
         faces=mesh.n_faces,
         target=target,
@@ -312,6 +397,7 @@ def _remesh_part(
         cancelled=cancelled,
         seconds=dict(watch.seconds),
     )
+    return _Part(quads, report, uv)
 
 
 def _by_map(
@@ -323,7 +409,7 @@ def _by_map(
     surface: ClosestPoints,
     watch: _Watch,
     tell: Progress,
-) -> tuple[QuadMesh, AlignedField]:
+) -> _Mapped:
     """Quads by an integer-grid map.
 
     Raises
@@ -345,7 +431,8 @@ def _by_map(
         )
     tell("quantise", 0.5)
     with watch("quantise"):
-        tmesh = build_tmesh(aligned, seamless, trace(aligned, seamless))
+        tracing = trace(aligned, seamless)
+        tmesh = build_tmesh(aligned, seamless, tracing)
         layout = quantise(tmesh, target, seamless.area).layout
     tell("lay out", 0.7)
     with watch("lay out"):
@@ -356,7 +443,7 @@ def _by_map(
     with watch("polish"):
         fixed, curves = _constraints(layout)
         vertices = smooth_quads(vertices, layout.quads, surface, fixed, curves)
-    return QuadMesh(vertices, layout.quads), aligned
+    return _Mapped(QuadMesh(vertices, layout.quads), aligned, seamless, tracing, layout)
 
 
 def _require_topology(quads: QuadMesh, mesh: TriMesh) -> None:
