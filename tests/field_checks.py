@@ -40,7 +40,12 @@ def check_aligned(source: TriMesh, aligned: AlignedField) -> None:
     # 3. singular sectors are never neighbours, and none is too narrow
     singular = aligned.sector_quads != flat_quads(aligned)
     assert not (singular[s[h]] & singular[s[next_halfedge(h)]]).any()
-    assert (aligned.sector_quads >= np.where(aligned.sector_is_feature, 1, 3)).all()
+    assert (aligned.sector_quads >= 1).all()
+    around = np.bincount(aligned.sector_vertex, aligned.sector_quads, mesh.n_vertices)
+    assert (around[~mesh.is_boundary_vertex & (mesh.outgoing >= 0)] >= 3).all()
+    angle = np.bincount(s, mesh.corner_angles.reshape(-1))
+    widest = (angle / aligned.sector_quads)[aligned.sector_is_feature]
+    assert widest.max(initial=0.0) < np.radians(150.1)
 
     # 4. the index theorem on the mesh cut open along its creases
     cut_edges = mesh.n_edges + int((feature & inner).sum()) // 2

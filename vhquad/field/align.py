@@ -103,7 +103,7 @@ class AlignedField:
 
     Guaranteed: every face has at most one feature edge; every other edge has at most one end on a
     feature and joins at most one singular sector (quads other than 4, at a feature other than 2);
-    ``sector_quads`` is at least 1, and at interior vertices at least 3.
+    ``sector_quads`` is at least 1, and adds up to at least 3 around interior vertices.
 
     Attributes
     ----------

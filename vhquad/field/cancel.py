@@ -33,8 +33,8 @@ __all__ = [
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-LEAST_PLAIN = 3  # fewer quads around an interior vertex would make doublets
-LEAST_FEATURE = 1
+LEAST_INNER = 3  # fewer quads around an interior vertex would make doublets
+WIDEST_CORNER = np.radians(150.0)
 LEAST_CORNER = np.radians(50.0)  # of a quad at a feature that takes a singularity
 MOST_CORNER = np.radians(130.0)
 CHUNK = 64
@@ -154,8 +154,9 @@ def absorb_at_features(matched: MatchedField, distance: float) -> tuple[MatchedF
 def cure_low_sectors(matched: MatchedField, distance: float) -> tuple[MatchedField, int]:
     """Give every sector the fewest quads it needs, taken from vertices near by.
 
-    A boundary or crease sector needs one; an interior vertex three, since one or two quads around
-    it could not be convex: an index of 1/2 becomes two of 1/4.
+    An interior vertex needs three, on creases too, since two quads around it could not be convex:
+    an index of 1/2 becomes two of 1/4. A boundary or crease sector needs as many as keep their
+    corners below 150 degrees.
 
     Parameters
     ----------
@@ -171,14 +172,14 @@ def cure_low_sectors(matched: MatchedField, distance: float) -> tuple[MatchedFie
         What could not be had from the vertices there are is left; split some edges and ask again.
     """
     quads = matched.sector_quads.copy()
-    least = np.where(matched.sector_is_feature, LEAST_FEATURE, LEAST_PLAIN)
-    low = np.flatnonzero(low_sectors(matched))
+    least = _least_quads(matched)
+    low = np.flatnonzero(quads < least)
     graph = _sector_links(matched, matched.mesh.edge_lengths.reshape(-1))
     paths = []
     for sector in low:  # few
         far, before = dijkstra(graph, indices=np.array([sector]), return_predecessors=True)
         for _ in range(int(least[sector] - quads[sector])):
-            giver = _giver(matched, quads, far[0], distance)
+            giver = _giver(matched, quads, least, far[0], distance)
             if giver < 0:
                 break
             paths.append(_trace(before[0], giver))
@@ -189,8 +190,26 @@ def cure_low_sectors(matched: MatchedField, distance: float) -> tuple[MatchedFie
 
 def low_sectors(matched: MatchedField) -> Bools:
     """Which sectors have fewer quads than they need; (s,)."""
-    least = np.where(matched.sector_is_feature, LEAST_FEATURE, LEAST_PLAIN)
-    return np.asarray(matched.sector_quads < least)
+    return np.asarray(matched.sector_quads < _least_quads(matched))
+
+
+def _least_quads(matched: MatchedField) -> Ints:
+    """Quads that each sector needs at least; (s,)."""
+    feature, vertex = matched.sector_is_feature, matched.sector_vertex
+    angle = np.bincount(matched.corner_sector, matched.mesh.corner_angles.reshape(-1))
+    fitting = np.maximum(np.ceil(angle / WIDEST_CORNER - 1e-9), 1.0).astype(np.int64)
+    least = np.where(feature, fitting, LEAST_INNER)
+
+    # An inner vertex on creases has several sectors, which must make up for each other.
+    quads = np.maximum(matched.sector_quads, least)
+    total = np.bincount(vertex, quads, matched.mesh.n_vertices)
+    short = feature & ~matched.mesh.is_boundary_vertex[vertex]
+    short &= total[vertex] < LEAST_INNER
+    for v in np.unique(vertex[short]):  # few
+        sectors = np.flatnonzero(vertex == v)
+        widest = sectors[np.argmax(angle[sectors] / quads[sectors])]
+        least[widest] = quads[widest] + LEAST_INNER - int(total[v])
+    return least
 
 
 def _near_pairs(matched: MatchedField, start: Bools, end: Bools, distance: float) -> list[Ints]:
@@ -218,17 +237,22 @@ def _moved(matched: MatchedField, paths: list[Ints], distance: float) -> Matched
     return relax(moved, _around(moved, np.unique(np.concatenate(paths)), distance))
 
 
-def _giver(matched: MatchedField, quads: Ints, far: NDArray[np.float64], distance: float) -> int:
+def _giver(
+    matched: MatchedField, quads: Ints, least: Ints, far: NDArray[np.float64], distance: float
+) -> int:
     """The best sector to take a quad from: over-full and near by, else flat; -1 if none."""
     plain = ~matched.sector_is_feature
-    reached = np.isfinite(far)
-    near = reached & (far > 0) & (far <= 2.0 * distance)
+    # Sectors of a crease share what their vertex needs: they do not give.
+    able_at_all = np.isfinite(far) & (
+        plain | matched.mesh.is_boundary_vertex[matched.sector_vertex]
+    )
+    near = far <= 2.0 * distance
     for able, preferred in (
-        (near & ((plain & (quads > 4)) | (~plain & (quads > 2))), 0.0),
-        (reached & plain & (quads == 4), 0.5 * distance),
-        (reached & ((plain & (quads > LEAST_PLAIN)) | (~plain & (quads > LEAST_FEATURE))), 0.0),
+        (near & (quads > np.where(plain, 4, np.maximum(least, 2))), 0.0),
+        (plain & (quads == 4), 0.5 * distance),
+        (quads > least, 0.0),
     ):
-        choice = np.flatnonzero(able & (far > 0))
+        choice = np.flatnonzero(able & able_at_all & (far > 0))
         if choice.size:
             return int(choice[np.argmin(np.abs(far[choice] - preferred))])
     return -1
