@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +22,7 @@ __all__ = [
     "FieldReport",
     "MeshCounts",
     "RemeshReport",
+    "SymmetryReport",
     "quality_shortfalls",
     "versions",
 ]
@@ -98,6 +99,46 @@ class ComponentReport:
 
 
 @dataclass(frozen=True)
+class SymmetryReport:
+    """The mirror plane that was asked for.
+
+    Attributes
+    ----------
+    asked : str
+        "auto", or the axis that the plane is across.
+    plane : str
+        Its equation, such as ``x = 0``; empty if the quads were not made symmetric.
+    normal : tuple of float
+        Of the best plane found, whether it was used or not.
+    offset : float
+        It holds the points p with ``normal . p = offset``.
+    median, tail : float
+        Half, and 95 %, of the mirrored input are nearer to the input than this, in % of the
+        diagonal.
+    made : bool
+        Whether the quads are their own mirror image.
+    doubled : int
+        Components that had no mirror image in the input.
+    warnings : tuple of str
+    """
+
+    asked: str
+    plane: str
+    normal: tuple[float, ...]
+    offset: float
+    median: float
+    tail: float
+    made: bool
+    doubled: int = 0
+    warnings: tuple[str, ...] = ()
+
+    def given_up(self, reason: str) -> SymmetryReport:
+        """The same, where symmetric quads could not be had."""
+        line = f"the quads are not symmetric in {self.plane}, because {reason}"
+        return replace(self, plane="", made=False, warnings=(*self.warnings, line))
+
+
+@dataclass(frozen=True)
 class RemeshReport:
     """What one remesh was asked for, what it made and how; written even if it fell short.
 
@@ -112,7 +153,9 @@ class RemeshReport:
     quality : QualityReport or None
         Figures of the result against the input.
     components : tuple of ComponentReport
-        In the order of the input's components.
+        In the order of the input's components; of the half that was mirrored, if one was.
+    symmetry : SymmetryReport or None
+        None if no symmetry was asked for.
     repair : tuple of str
         What was repaired in the input, a line each.
     seconds : dict of str to float
@@ -131,6 +174,7 @@ class RemeshReport:
     output: MeshCounts
     quality: QualityReport | None = None
     components: tuple[ComponentReport, ...] = ()
+    symmetry: SymmetryReport | None = None
     repair: tuple[str, ...] = ()
     seconds: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
@@ -150,6 +194,12 @@ class RemeshReport:
     def shortfalls(self) -> tuple[str, ...]:
         """What a user should know before using the result, a line each; empty if all is well."""
         lines = list(self.warnings)
+        if self.symmetry is not None:
+            lines += self.symmetry.warnings
+            if self.symmetry.doubled:
+                lines.append(
+                    f"{self.symmetry.doubled} components have no mirror image: now doubled"
+                )
         if self.made == 0 or abs(self.made - self.asked) > COUNT_BAND * self.asked:
             lines.append(f"{self.made} quads were made where {self.asked} were asked for")
         if not self.topology_kept:

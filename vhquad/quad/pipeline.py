@@ -32,11 +32,12 @@ from vhquad.quad.fallback import triangles_to_quads
 from vhquad.quad.integer_map import integer_map
 from vhquad.quad.layout import Layout
 from vhquad.quad.motorcycle import Tracing, trace
+from vhquad.quad.parts import Part, UvMap, join_quads, join_uv
 from vhquad.quad.quantize import quantise
 from vhquad.quad.seamless_map import SeamlessMap, solve_seamless_map
 from vhquad.quad.sizing import checked_density, wanted_sizes
 from vhquad.quad.smooth import smooth_quads
-from vhquad.quad.symmetric import SYMMETRIES, Parts, find_plane, remesh_mirrored
+from vhquad.quad.symmetric import SYMMETRIES, find_plane, remesh_mirrored
 from vhquad.quad.tmesh import build_tmesh
 from vhquad.report import ComponentReport, MeshCounts, RemeshReport, SymmetryReport
 
@@ -96,40 +97,12 @@ class RemeshSettings:
 
 
 @dataclass(frozen=True, eq=False)
-class UvMap:
-    """An integer-grid map of the input: its integer isolines are the edges of the quads.
-
-    Attributes
-    ----------
-    mesh : TriMesh
-        The input, refined where the map needs it.
-    uv : (m, 3, 2) float64
-        Coordinates of each corner, in quad edges.
-    flips : int
-        Triangles that the map folds, none but at coarse targets.
-    """
-
-    mesh: TriMesh
-    uv: Floats
-    flips: int
-
-
-@dataclass(frozen=True, eq=False)
 class RemeshResult:
     """Quads, the report of how they were made, and their map on the input if it was asked for."""
 
     quads: QuadMesh
     report: RemeshReport
     uv: UvMap | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class _Part:
-    """The quads of one component, how they were made, and their map if asked for."""
-
-    quads: QuadMesh
-    report: ComponentReport
-    uv: UvMap | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,6 +145,7 @@ def remesh_mesh(
     *,
     creases: ArrayLike | None = None,
     density: ArrayLike | None = None,
+    with_uv: bool = False,
     progress: Progress | None = None,
 ) -> RemeshResult:
     """Quads along a cross field.
@@ -188,6 +162,8 @@ def remesh_mesh(
     density : (n,) array_like, optional
         Factor on the quads per area at each vertex, positive; twice the density makes edges
         shorter by the root of two. With a count asked for only ratios matter.
+    with_uv : bool
+        Make the integer-grid map too; with a symmetry, that of the half.
     progress : callable, optional
         Called with (step, share done).
 
@@ -220,29 +196,25 @@ def remesh_mesh(
     )
     field = replace(field, size=size)
     given = None if creases is None else np.asarray(creases, dtype=np.int64).reshape(-1, 2)
-    result, reports, symmetry = _remesh(mesh, field, given, settings, watch, progress)
+    result, parts, symmetry = _remesh(mesh, field, given, settings, with_uv, watch, progress)
     with watch("check"):
         quality = check_quads(result, mesh)
     seconds = dict(watch.seconds)
-    for report in reports:
-        for step, value in report.seconds.items():
+    for part in parts:
+        for step, value in part.report.seconds.items():
             seconds[step] = seconds.get(step, 0.0) + value
-    return RemeshResult(
-        quads=result,
-        report=RemeshReport(
-            asked=asked,
-            made=result.n_quads,
-            input=MeshCounts.of(mesh),
-            output=MeshCounts.of(result),
-            quality=quality,
-            components=tuple(reports),
-            symmetry=symmetry,
-            seconds=seconds,
-            settings={
-                name: getattr(settings, name) for name in RemeshSettings.__dataclass_fields__
-            },
-        ),
+    report = RemeshReport(
+        asked=asked,
+        made=result.n_quads,
+        input=MeshCounts.of(mesh),
+        output=MeshCounts.of(result),
+        quality=quality,
+        components=tuple(part.report for part in parts),
+        symmetry=symmetry,
+        seconds=seconds,
+        settings={name: getattr(settings, name) for name in RemeshSettings.__dataclass_fields__},
     )
+    return RemeshResult(result, report, join_uv([part.uv for part in parts]))
 
 
 def _remesh(
@@ -250,13 +222,14 @@ def _remesh(
     field: CrossField,
     given: Ints | None,
     settings: RemeshSettings,
+    with_uv: bool,
     watch: _Watch,
     progress: Progress | None,
-) -> tuple[QuadMesh, list[ComponentReport], SymmetryReport | None]:
+) -> tuple[QuadMesh, list[Part], SymmetryReport | None]:
     """Quads of the whole mesh; of one half and its mirror image, if there is a plane for it."""
 
-    def remesh_parts(half: TriMesh, own: CrossField, creases: Ints | None) -> Parts:
-        return _remesh_parts(half, own, creases, settings.crease, progress)
+    def remesh_parts(half: TriMesh, own: CrossField, creases: Ints | None) -> list[Part]:
+        return _remesh_parts(half, own, creases, settings.crease, with_uv, progress)
 
     symmetry: SymmetryReport | None = None
     if settings.symmetry != "off":
@@ -264,12 +237,13 @@ def _remesh(
             plane, symmetry = find_plane(mesh, settings.symmetry)
         if plane is not None:
             try:
-                quads, doubled, reports = remesh_mirrored(mesh, field, given, plane, remesh_parts)
-                return quads, reports, replace(symmetry, doubled=doubled)
+                mirrored = remesh_mirrored(mesh, field, given, plane, remesh_parts)
+                symmetry = replace(symmetry, doubled=mirrored.doubled)
+                return mirrored.quads, mirrored.parts, symmetry
             except ParametrizationError as problem:
                 symmetry = symmetry.given_up(str(problem))
     parts = remesh_parts(mesh, field, given)
-    return parts.joined(), parts.reports, symmetry
+    return join_quads([part.quads for part in parts]), parts, symmetry
 
 
 def _remesh_parts(
@@ -277,12 +251,13 @@ def _remesh_parts(
     field: CrossField,
     given: Ints | None,
     angle: float | None,
+    with_uv: bool,
     progress: Progress | None,
-) -> Parts:
+) -> list[Part]:
     """Quads of every component by itself; the field has the sizes wanted."""
     size = np.ones(mesh.n_faces) if field.size is None else field.size
     density = mesh.face_areas / size**2
-    parts = Parts([], [])
+    parts: list[Part] = []
     n_parts = mesh.n_components
     for number in range(n_parts):
 
@@ -305,9 +280,7 @@ def _remesh_parts(
             None if field.confidence is None else field.confidence[inside],
         )
         target = max(round(float(density[inside].sum())), LEAST_QUADS)
-        made, report = _remesh_part(part, part_field, own, angle, target, tell)
-        parts.quads.append(made)
-        parts.reports.append(report)
+        parts.append(_remesh_part(part, part_field, own, angle, target, with_uv, tell))
     return parts
 
 
@@ -353,7 +326,7 @@ def _remesh_part(
     target: int,
     with_uv: bool,
     tell: Progress,
-) -> _Part:
+) -> Part:
     """Quads of one component by the first attempt that gives a valid mesh of about the count."""
     watch = _Watch()
     surface = ClosestPoints(mesh)
@@ -397,7 +370,7 @@ def _remesh_part(
         cancelled=cancelled,
         seconds=dict(watch.seconds),
     )
-    return _Part(quads, report, uv)
+    return Part(quads, report, uv)
 
 
 def _by_map(

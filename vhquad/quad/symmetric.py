@@ -1,0 +1,148 @@
+"""Exactly mirror-symmetric quads: remesh one half up to its plane, and mirror it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vhquad.errors import ParametrizationError
+from vhquad.field.cross import CrossField
+from vhquad.field.mirrored import to_half, with_mirror_image
+from vhquad.mesh.mirror import Half, cut_half, mirror_faces
+from vhquad.mesh.plane import MirrorPlane
+from vhquad.mesh.quad import QuadMesh
+from vhquad.mesh.symmetry import Symmetry, find_symmetry
+from vhquad.mesh.triangle import TriMesh
+from vhquad.quad.parts import Part, join_quads
+from vhquad.report import MeshCounts, SymmetryReport
+
+__all__ = ["SYMMETRIES", "Mirrored", "find_plane", "remesh_mirrored"]
+
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+SYMMETRIES = ("off", "auto", "x", "y", "z")
+
+_ON = 1e-9
+"""Boundary vertices of the quads nearer to the plane than this share of the diagonal are on it."""
+
+
+Remesher = Callable[[TriMesh, CrossField, Ints | None], list[Part]]
+
+
+@dataclass(frozen=True, eq=False)
+class Mirrored:
+    """Symmetric quads, and the half that they were made of.
+
+    Attributes
+    ----------
+    quads : QuadMesh
+        Vertices of the half first, then their images in the same order, less those on the plane.
+    parts : list of Part
+        Of the components of the half.
+    doubled : int
+        Components that had no mirror image.
+    """
+
+    quads: QuadMesh
+    parts: list[Part]
+    doubled: int
+
+
+def find_plane(mesh: TriMesh, symmetry: str) -> tuple[MirrorPlane | None, SymmetryReport]:
+    """The plane to mirror in, and what to say about it.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+    symmetry : str
+        "auto", which may find that there is none, or "x", "y" or "z" for a plane across that axis.
+    """
+    found = find_symmetry(mesh, None if symmetry == "auto" else "xyz".index(symmetry))
+    plane = found.plane if found.holds or symmetry != "auto" else None
+    return plane, _report(symmetry, found, plane is not None)
+
+
+def _report(asked: str, found: Symmetry, made: bool) -> SymmetryReport:
+    off = (
+        f"half of the mirrored surface is more than {100 * found.median:.2g} % of the diagonal off"
+    )
+    warnings = []
+    if not made:
+        warnings.append(f"no mirror plane was found: in the best, {found.plane.name}, {off}")
+    elif not found.holds:
+        warnings.append(
+            f"the mesh is not symmetric in {found.plane.name} ({off} and a twentieth more than "
+            f"{100 * found.tail:.2g} %); one half was mirrored all the same"
+        )
+    return SymmetryReport(
+        asked=asked,
+        plane=found.plane.name if made else "",
+        normal=tuple(found.plane.normal.tolist()),
+        offset=found.plane.offset,
+        median=100.0 * found.median,
+        tail=100.0 * found.tail,
+        made=made,
+        warnings=tuple(warnings),
+    )
+
+
+def remesh_mirrored(
+    mesh: TriMesh,
+    field: CrossField,
+    creases: Ints | None,
+    plane: MirrorPlane,
+    remesh_parts: Remesher,
+) -> Mirrored:
+    """Quads that are their own mirror image, vertex for vertex, with edges on the plane.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+        Sound, and about symmetric.
+    field : CrossField
+        On its faces, with the sizes wanted.
+    creases : (k, 2) int64, optional
+        Edges to keep.
+    plane : MirrorPlane
+    remesh_parts : callable
+        Makes quads of every component of a mesh.
+
+    Raises
+    ------
+    MeshError
+        If there is nothing to mirror.
+    ParametrizationError
+        If the mirrored quads are no manifold of the topology that mirroring the half makes.
+    """
+    half = cut_half(mesh, plane)
+    wanted = float((mesh.face_areas / _sizes(field) ** 2).sum())
+    own = to_half(mesh, with_mirror_image(mesh, field, plane), half)
+    count = 2.0 * float((half.mesh.face_areas / _sizes(own) ** 2).sum())
+    own = replace(own, size=_sizes(own) * np.sqrt(count / wanted))
+    parts = remesh_parts(half.mesh, own, None if creases is None else half.carry_edges(creases))
+    on = [_on_plane(p.quads, half) & cut for p, cut in zip(parts, half.is_cut, strict=True)]
+    quads = join_quads([part.quads for part in parts])
+    quads = QuadMesh(*mirror_faces(quads.vertices, quads.quads, np.concatenate(on), plane))
+    made = MeshCounts.of(quads).topology
+    if not quads.is_manifold or made != half.topology:
+        raise ParametrizationError(
+            "the mirrored quads are not manifold"
+            if not quads.is_manifold
+            else "the mirrored quads have (components, Euler characteristic, boundary loops) "
+            f"{made} instead of {half.topology}"
+        )
+    return Mirrored(quads, parts, half.doubled)
+
+
+def _sizes(field: CrossField) -> NDArray[np.float64]:
+    return np.ones(len(field)) if field.size is None else field.size
+
+
+def _on_plane(quads: QuadMesh, half: Half) -> Bools:
+    """Boundary vertices on the plane: the pipeline keeps to the boundary up to rounding; (n,)."""
+    height = np.abs(half.plane.height(quads.vertices))
+    return quads.is_boundary_vertex & (height <= _ON * half.mesh.diagonal)
