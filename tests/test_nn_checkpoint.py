@@ -11,7 +11,7 @@ import torch
 
 from tests.nn_inputs import answer, as_input, blob_operators, random_network, small_settings
 from vhquad.errors import ConfigError, ModelError
-from vhquad.nn.checkpoint import Model, load_model, save_model
+from vhquad.nn.checkpoint import Model, default_model_path, load_model, save_model
 from vhquad.nn.settings import ModelSettings, preset
 
 
@@ -106,3 +106,13 @@ def test_settings_check_themselves() -> None:
     with pytest.raises(ConfigError, match="paper, starter"):
         preset("large")
     assert ModelSettings.from_dict(preset("paper").to_dict()) == preset("paper")
+
+
+def test_the_shipped_model() -> None:
+    """6. It is there, loads, is the starter preset, and carries the losses of its card."""
+    model = load_model()
+    assert model.settings == preset("starter")
+    assert default_model_path().stat().st_size < 10_000_000
+    assert model.losses["test"]["direction"] < 0.05
+    card = (default_model_path().parent / "README.md").read_text(encoding="utf-8")
+    assert f"{model.losses['test']['direction']:.3f}" in card
