@@ -132,6 +132,27 @@ def test_cones_become_irregular_vertices(quadrants: int) -> None:
     assert (found.polygons.vertices[apex[0]] == case.mesh.vertices[0]).all()
 
 
+def test_corners_joined_along_isolines() -> None:
+    """A cross of five squares: inside edges run along isolines between pinned corners."""
+    squares = [(1, 0), (0, 1), (1, 1), (2, 1), (1, 2)]
+    corners = sorted({(i + a, j + b) for i, j in squares for a in (0, 1) for b in (0, 1)})
+    number = {c: k for k, c in enumerate(corners)}
+    faces = []
+    for i, j in squares:
+        a, b, c, d = (number[i + x, j + y] for x, y in ((0, 0), (1, 0), (1, 1), (0, 1)))
+        faces += [[a, b, c], [a, c, d]]
+    v = np.column_stack([np.array(corners), np.zeros(len(corners))])
+    mesh = TriMesh(v, faces)
+    for size in (1, 2, 3):
+        uv = np.array(corners)[mesh.faces] * size * GRID
+        cells = 5 * size**2
+        rim = 12 * size
+        case = case_of(mesh, uv, (1 + (2 * cells + rim // 2) - cells, 2 * cells + rim // 2, cells))
+        for seed in range(4):
+            turned = turned_charts(case, np.random.default_rng(seed))
+            assert_valid(case, extract_polygons(*turned.args))
+
+
 def test_boundary_vertices_lie_on_boundary_edges() -> None:
     case = turned_charts(tube(7, 4, 9, 5, np.random.default_rng(0)), np.random.default_rng(1))
     found = extract_polygons(*case.args)
@@ -192,6 +213,14 @@ def test_folds_are_undone(
     assert_glued(found)
     # 2: and that of the unfolded map, cell for cell.
     assert_valid(flat, found)
+
+
+def test_fold_at_a_corner_between_the_boundary() -> None:
+    """Two arcs of unlike sign join two corners side by side; neither is empty of length."""
+    rng = np.random.default_rng(200)
+    width, height, nu, nv = rng.integers([1, 1, 3, 3], [7, 7, 12, 12]).tolist()
+    flat = any_case("plane", 200, width, height, nu, nv)
+    assert_valid(flat, extract_polygons(*with_folds(flat, 20, 2.0, rng).args))
 
 
 @given(KINDS, SEEDS, SMALL, SMALL, LATTICE, LATTICE)

@@ -13,8 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from vhquad.mesh.triangle import TriMesh
 from vhquad.quad.darts import Darts, face_orbits
@@ -117,25 +115,7 @@ def _unfold(mesh: TriMesh, graph: IsolineGraph) -> tuple[Darts, int]:
     corner = np.zeros(len(graph.face), dtype=bool)
     corner[pinned] = mesh.is_boundary_vertex[graph.vertex[pinned]]
     darts = Darts(graph, corner)
-    if (graph.sign > 0).all():
-        return darts, 0
-    contracted = darts.unfold()
-    _drop_islands(mesh, graph, darts)
-    return darts, contracted
-
-
-def _drop_islands(mesh: TriMesh, graph: IsolineGraph, darts: Darts) -> None:
-    """Of each component of the surface keep the greatest part of the graph; folds leave others."""
-    d = np.flatnonzero(darts.alive)
-    n = len(graph.face)
-    arcs = (darts.point[d], darts.point[darts.across[d]])
-    links = coo_matrix((np.ones(len(d), dtype=np.int8), arcs), shape=(n, n))
-    label = connected_components(links, directed=False)[1][darts.point[d]]
-    where = mesh.face_component[graph.face[darts.point[d]]]
-    size = np.bincount(label)
-    greatest = np.zeros(mesh.n_components, dtype=np.int64)
-    np.maximum.at(greatest, where, size[label])
-    darts.alive[d[size[label] < greatest[where]]] = False
+    return darts, darts.unfold() if (graph.sign < 0).any() else 0
 
 
 def _barycentric(grid_map: IntegerGridMap, graph: IsolineGraph, points: Ints) -> Floats:
