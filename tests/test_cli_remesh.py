@@ -108,6 +108,30 @@ def test_repairs_are_told(invoke: Invoke, tmp_path: Path) -> None:
     assert invoke("remesh", source, *FAST, "--quiet").code == 0
 
 
+def test_symmetric_quads(invoke: Invoke, ring: Path) -> None:
+    """Every vertex has its mirror image, to the last digit."""
+    run = invoke("remesh", ring, *FAST, "--symmetry", "x")
+    assert run.code == 0
+    assert "mirror plane" in run.out
+    vertices = read_quad_mesh(ring.with_name("ring_quads.obj")).vertices
+    assert {tuple(v) for v in (vertices * [-1, 1, 1] + 0.0).tolist()} == {
+        tuple(v) for v in (vertices + 0.0).tolist()
+    }
+
+
+def test_density_by_colour(invoke: Invoke, tmp_path: Path) -> None:
+    """A ring that is white where x > 0 has more quads there, as far as loops allow."""
+    mesh = torus(32, 16)
+    colour = np.where(mesh.vertices[:, :1] > 0, 1.0, 0.5) * np.ones(3)
+    path = write_obj(tmp_path / "a.obj", np.hstack([mesh.vertices, colour]), mesh.faces)
+    run = invoke("remesh", path, "--method", "curvature", "-n", "600", "--density", "color")
+    assert run.code == 0
+    quads = read_quad_mesh(tmp_path / "a_quads.obj")
+    right = quads.vertices[quads.quads].mean(axis=1)[:, 0] > 0
+    assert right.sum() > 1.1 * (~right).sum()
+    assert invoke("remesh", path, "--density", "weight").refused("'weight'", "color")
+
+
 def test_map_for_libqex(invoke: Invoke, ring: Path) -> None:
     """As many cells of the integer grid as there are quads."""
     uv = ring.with_name("uv.obj")

@@ -23,9 +23,10 @@ from vhquad.mesh.load import LoadedMesh, load
 from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.quality import check_quads
 from vhquad.mesh.repair import repair
+from vhquad.mesh.scalars import carried
 from vhquad.mesh.triangle import TriMesh
 from vhquad.quad.pipeline import RemeshResult, RemeshSettings, remesh_mesh
-from vhquad.quad.sizing import SIZE_RANGE
+from vhquad.quad.sizing import SIZE_RANGE, checked_density
 from vhquad.report import CheckReport, FieldReport, MeshCounts
 
 if TYPE_CHECKING:
@@ -113,6 +114,9 @@ def remesh(
     field: CrossField | str | PathLike[str] | None = None,
     model: Model | Path | str | None = None,
     crease: float | None = 40.0,
+    adaptivity: float = 1.0,
+    density: ArrayLike | None = None,
+    symmetry: str = "off",
     seed: int = 0,
     progress: Progress | None = None,
 ) -> RemeshResult:
@@ -135,6 +139,12 @@ def remesh(
         A trained model; the shipped one if not given.
     crease : float or None
         Edges whose faces turn by more than so many degrees are kept as edges; None keeps none.
+    adaptivity : float
+        0 for quads of one size, 1 for the sizes of the field, or between.
+    density : (n,) array_like, optional
+        Factor on the quads per area at each vertex.
+    symmetry : str
+        "x", "y", "z" or "auto" for quads that are their own mirror image; "off".
     seed : int
         The same seed gives the same quads.
     progress : callable, optional
@@ -151,11 +161,20 @@ def remesh(
         If the mesh, the field, the model or an option cannot be used.
     """
     settings = RemeshSettings(
-        target_quads=target_quads, edge_length=edge_length, crease=crease, seed=seed
+        target_quads=target_quads,
+        edge_length=edge_length,
+        crease=crease,
+        adaptivity=adaptivity,
+        symmetry=symmetry,
+        seed=seed,
     )
     seconds: dict[str, float] = {}
     with clock(seconds, "repair"):
         repaired = repair(vertices, faces)
+    factor = None
+    if density is not None:
+        values = checked_density(density, len(np.asarray(vertices)))
+        factor = carried(values, repaired.vertex_source, repaired.mesh)
     with clock(seconds, "field"):
         cross = own_field(repaired.mesh, field) if field is not None else None
         if cross is None:
@@ -164,6 +183,7 @@ def remesh(
         repaired.mesh,
         cross,
         settings,
+        density=factor,
         repair_lines=repaired.report.lines(),
         seconds=seconds,
         progress=progress,
@@ -176,6 +196,7 @@ def remesh_with(
     settings: RemeshSettings | None = None,
     *,
     creases: ArrayLike | None = None,
+    density: ArrayLike | None = None,
     with_uv: bool = False,
     repair_lines: Sequence[str] = (),
     seconds: Mapping[str, float] | None = None,
@@ -190,7 +211,9 @@ def remesh_with(
         On its vertices or faces.
     settings : RemeshSettings, optional
     creases : (k, 2) array_like, optional
-        Vertex pairs of edges to keep, beside those that the settings find.
+        Vertex pairs of edges to keep, in place of those that the settings find.
+    density : (n,) array_like, optional
+        Factor on the quads per area at each vertex.
     with_uv : bool
         Make the integer-grid map on the triangles as well.
     repair_lines : sequence of str
@@ -203,7 +226,15 @@ def remesh_with(
     -------
     RemeshResult
     """
-    result = remesh_mesh(mesh, field, settings, creases=creases, with_uv=with_uv, progress=progress)
+    result = remesh_mesh(
+        mesh,
+        field,
+        settings,
+        creases=creases,
+        density=density,
+        with_uv=with_uv,
+        progress=progress,
+    )
     report = replace(
         result.report,
         repair=(*repair_lines, *result.report.repair),

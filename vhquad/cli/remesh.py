@@ -38,6 +38,16 @@ class Method(str, Enum):
     curvature = "curvature"
 
 
+class Symmetry(str, Enum):
+    """Where the mirror plane is sought."""
+
+    off = "off"
+    x = "x"
+    y = "y"
+    z = "z"
+    auto = "auto"
+
+
 @guarded
 def remesh(
     ctx: typer.Context,
@@ -79,6 +89,24 @@ def remesh(
             help="0 for quads of one size, 1 for the sizes of the field, or between.",
         ),
     ] = 1.0,
+    density: Annotated[
+        str | None,
+        typer.Option(
+            "--density",
+            metavar="NAME",
+            help="A factor on the quads per area from the mesh's file: a vertex property of a PLY "
+            "by its name, or `color` (white 4, mid-grey 1, black 1/4).",
+            show_default=False,
+        ),
+    ] = None,
+    symmetry: Annotated[
+        Symmetry,
+        typer.Option(
+            "--symmetry",
+            help="Quads that are their own mirror image, in the best plane across an axis, or "
+            "(auto) in the best plane of all if the mesh has one.",
+        ),
+    ] = Symmetry.off,
     crease: Annotated[
         str,
         typer.Option(
@@ -162,6 +190,7 @@ def remesh(
     with Progress(shell.quiet, "loading libraries") as progress:
         from vhquad import api
         from vhquad.mesh.io import write_quad_mesh
+        from vhquad.mesh.scalars import read_density
         from vhquad.quad.pipeline import RemeshSettings
 
         if preview is not None:
@@ -173,12 +202,14 @@ def remesh(
             edge_length=edge_length,
             crease=angle,
             adaptivity=adaptivity,
+            symmetry=symmetry.value,
             seed=seed,
         )
         seconds: dict[str, float] = {}
         progress(f"reading {mesh}")
         with api.clock(seconds, "read and repair"):
             loaded = api.load(mesh)
+        factor = None if density is None else read_density(loaded, density)
         progress("the cross field")
         with api.clock(seconds, "field"):
             if field is not None:
@@ -198,6 +229,7 @@ def remesh(
             cross,
             settings,
             creases=_given_creases(loaded, angle, sharp),
+            density=factor,
             with_uv=uv_out is not None,
             repair_lines=loaded.lines(),
             seconds=seconds,

@@ -87,6 +87,9 @@ def _remesh_table(report: RemeshReport, target: str | None) -> Table:
     table.add_row("quads", f"{report.made:,}  (asked {report.asked:,}{_off(report)})")
     if report.quality is not None:
         _quality_rows(table, report.quality, report.input)
+    if report.symmetry is not None:
+        found = report.symmetry
+        table.add_row("mirror plane", found.plane if found.made else "not symmetric")
     cancelled = sum(part.cancelled for part in report.components)
     if cancelled:
         table.add_row("singularity pairs cancelled", f"{cancelled}")

@@ -15,7 +15,7 @@ from vhquad.errors import MeshError
 from vhquad.mesh.parse import check_indices
 from vhquad.mesh.polygons import PolygonSoup
 
-__all__ = ["parse_ply"]
+__all__ = ["parse_ply", "read_tables"]
 
 Ints = NDArray[np.int64]
 
@@ -55,15 +55,7 @@ def parse_ply(data: bytes) -> PolygonSoup:
     MeshError
         If the header or the body is not as the format has it, or there are no vertices or faces.
     """
-    elements, kind, body = _header(data)
-    if kind == "ascii":
-        try:
-            data, body = np.array([float(x) for x in data[body:].split()]).tobytes(), 0
-        except ValueError:
-            raise MeshError("the text body holds something that is not a number") from None
-    tables: dict[str, dict[str, Any]] = {}
-    for element in elements:
-        tables[element.name], body = _read(data, body, element)
+    tables = read_tables(data)
     point = tables.get("vertex", {})
     if not {"x", "y", "z"} <= set(point):
         raise MeshError("there are no vertices with x, y and z")
@@ -77,6 +69,26 @@ def parse_ply(data: bytes) -> PolygonSoup:
     corners, sizes = lists
     check_indices(corners, len(vertices))
     return PolygonSoup(vertices, corners, sizes)
+
+
+def read_tables(data: bytes) -> dict[str, dict[str, Any]]:
+    """Columns by element and property: an array, or (flat values, lengths) for a list.
+
+    Raises
+    ------
+    MeshError
+        If the header or the body is not as the format has it.
+    """
+    elements, kind, body = _header(data)
+    if kind == "ascii":
+        try:
+            data, body = np.array([float(x) for x in data[body:].split()]).tobytes(), 0
+        except ValueError:
+            raise MeshError("the text body holds something that is not a number") from None
+    tables: dict[str, dict[str, Any]] = {}
+    for element in elements:
+        tables[element.name], body = _read(data, body, element)
+    return tables
 
 
 def _header(data: bytes) -> tuple[list[_Element], str, int]:
