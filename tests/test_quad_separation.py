@@ -99,7 +99,7 @@ def test_thin_tubes_are_widened() -> None:
         found = loop_conditions(narrow, wanted(s, 200))
         assert bool(found) == thin
         for condition in found:
-            assert value(condition, n) == condition.bound - 1
+            assert value(condition, n) < condition.bound <= 3
 
 
 def test_the_coarsest_cube_is_left_alone() -> None:

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from vhquad.quad.layout import Layout, side_length
 from vhquad.quad.tmesh import TMesh
@@ -273,7 +275,8 @@ def loop_conditions(layout: Layout, scaled: NDArray[np.float64]) -> list[Conditi
     """Conditions that widen tubes of one or two quads around, and quads that touch themselves.
 
     In each direction in which two lattice edges join the same two vertices, or one joins a vertex
-    to itself, the patch with the most room left gets one more quad.
+    to itself, the patch with the most room left gets one more quad. Every boundary loop gets three
+    edges.
     """
     q = layout.quads
     if len(q) == 0:
@@ -286,7 +289,7 @@ def loop_conditions(layout: Layout, scaled: NDArray[np.float64]) -> list[Conditi
     # Two quads that share two edges in a row enclose a vertex of valence two.
     opposite = (q[:, 0] == q[:, 2]) | (q[:, 1] == q[:, 3])
     bad |= np.repeat(opposite, 4)
-    conditions: dict[Condition, None] = {}
+    conditions = dict.fromkeys(_rim_conditions(layout))
     patches = layout.tmesh.patches
     by_key: dict[int, list[tuple[float, Condition]]] = {}
     for index in np.flatnonzero(bad).tolist():
@@ -302,3 +305,21 @@ def loop_conditions(layout: Layout, scaled: NDArray[np.float64]) -> list[Conditi
     for choices in by_key.values():
         conditions[max(choices, key=lambda c: c[0])[1]] = None
     return list(conditions)
+
+
+def _rim_conditions(layout: Layout) -> list[Condition]:
+    """Conditions for boundary loops of one or two edges, which would be one edge of the mesh."""
+    tmesh = layout.tmesh
+    inside = {h for patch in tmesh.patches for side in patch.sides for h in side}
+    rim = [a for a in range(len(tmesh.arcs)) if not {2 * a, 2 * a + 1} <= inside]
+    if not rim:
+        return []
+    ends = np.array([(tmesh.arcs[a].start, tmesh.arcs[a].end) for a in rim])
+    n = len(tmesh.node_points)
+    graph = coo_matrix((np.ones(len(rim), dtype=np.int8), (ends[:, 0], ends[:, 1])), shape=(n, n))
+    loop = connected_components(graph, directed=False)[1][ends[:, 0]]
+    edges = np.bincount(loop, weights=layout.lengths[rim])
+    return [
+        Condition(tuple((a, 1) for a, own in zip(rim, loop, strict=True) if own == thin), 3)
+        for thin in np.flatnonzero((edges > 0) & (edges < 3))
+    ]
