@@ -19,6 +19,7 @@ from vhquad.field.constrained import pose
 from vhquad.field.cross import CrossField
 from vhquad.field.features import crease_halfedges, hopeless_creases
 from vhquad.field.matching import MatchedField
+from vhquad.field.prune import prune_branches
 from vhquad.field.refine import Refinement, no_refinement, split_edges
 from vhquad.field.separate import separate_features, separate_singularities
 from vhquad.mesh.triangle import TriMesh
@@ -29,7 +30,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
+DEFAULT_QUADS = 2000
 SHORTEST_CREASE = 2.0  # edge lengths; of what is left where part of a crease was dropped
+LOOSE_CREASE = 1.5  # edge lengths; what dropping leaves as a shorter loose branch goes too
 SETTLE = 2.0  # edge lengths over which singularities may drift to better places
 MOST_SPLITS = 12  # rounds of splitting where vertices are too few; one or two happen
 
@@ -41,8 +44,8 @@ class AlignSettings:
     Attributes
     ----------
     edge_length : float, optional
-        Edge length of the quads to come. Default: the median size of the field, or what makes
-        2,000 quads.
+        Edge length of the quads to come, on average if the field has sizes. Default: the sizes of
+        the field as they are, or what makes 2,000 quads.
     smoothing : float
         Details of the field smaller than this many edge lengths are smoothed away.
     cancel : float
@@ -69,7 +72,7 @@ class AlignReport:
     Attributes
     ----------
     edge_length : float
-        Quad edge length that distances were measured by.
+        Quad edge length that distances were measured by, on average.
     splits : int
         Vertices added.
     corners : int
@@ -181,24 +184,27 @@ def align_field(
     flat = np.flatnonzero(mesh.face_areas <= 0.0)
     if flat.size:
         raise MeshError(f"{flat.size} faces have no area, the first is {flat[0]}; run repair first")
-    length = _edge_length(mesh, field, settings)
+    size = _quad_sizes(mesh, field, settings.edge_length)
+    length = float(np.sqrt(mesh.area / (mesh.face_areas / size**2).sum()))
     feature = (mesh.twin < 0) | crease_halfedges(mesh, creases)
     n_creases = _count_creases(mesh, feature)
     while True:
         first = separate_features(mesh, feature)
-        posed = pose(first, feature, field, length, settings.smoothing * length)
+        posed = pose(first, feature, field, size, settings.smoothing)
         z = posed.solve()
         blunt = hopeless_creases(posed.match(z), SHORTEST_CREASE * length)
         if not blunt.any():
             break
         feature[first.source[blunt]] = False
-    matched = posed.match(posed.settle(z, SETTLE * length))
+        feature &= ~_frayed(mesh, feature, first.source[blunt], LOOSE_CREASE * length)
+    matched = posed.match(posed.settle(z, SETTLE * posed.size))
 
     kept = posed.corner | (matched.feature & (matched.mesh.twin >= 0))
     n_kept = _count_creases(mesh, feature)
-    matched, cancelled = cancel_pairs(matched, settings.cancel * length, matched.touched(kept))
-    matched, absorbed = absorb_at_features(matched, settings.cancel * length)
-    matched, room, moved = _cure(matched, settings.cancel * length)
+    size, near = posed.size, settings.cancel
+    matched, cancelled = cancel_pairs(matched, near, matched.touched(kept), size)
+    matched, absorbed = absorb_at_features(matched, near, size)
+    matched, room, moved = _cure(matched, near, size)
     matched, last = separate_singularities(matched)
     report = AlignReport(
         edge_length=length,
@@ -214,23 +220,41 @@ def align_field(
     return _pack(matched, first.then(room).then(last), field, report)
 
 
-def _edge_length(mesh: TriMesh, field: CrossField, settings: AlignSettings) -> float:
-    if settings.edge_length is not None:
-        return settings.edge_length
-    if field.size is not None and (field.size > 0).any():
-        return float(np.median(field.size[field.size > 0]))
-    return float(np.sqrt(mesh.area / 2000.0))
+def _quad_sizes(mesh: TriMesh, field: CrossField, edge_length: float | None) -> Floats:
+    """Edge length of the quads to come at each face: the field's, scaled to the mean asked for."""
+    size = np.ones(mesh.n_faces) if field.size is None else field.size
+    if not (size > 0).any():
+        size = np.ones(mesh.n_faces)
+    size = np.where(size > 0, size, np.median(size[size > 0]))
+    if edge_length is None and (field.size is None or not field.size.any()):
+        edge_length = float(np.sqrt(mesh.area / DEFAULT_QUADS))
+    if edge_length is None:
+        return size
+    return size * edge_length * float(np.sqrt((mesh.face_areas / size**2).sum() / mesh.area))
 
 
 def _count_creases(mesh: TriMesh, feature: Bools) -> int:
     return int((feature & (mesh.twin >= 0)).sum()) // 2
 
 
-def _cure(matched: MatchedField, distance: float) -> tuple[MatchedField, Refinement, int]:
+def _frayed(mesh: TriMesh, feature: Bools, dropped: Ints, shortest: float) -> Bools:
+    """Crease halfedges on short branches that dropping some halfedges left loose; (3m,)."""
+    crease = feature & (mesh.twin >= 0)
+    pairs = mesh.edges[np.unique(mesh.halfedge_edge[crease])]
+    at = np.zeros(mesh.n_vertices, dtype=bool)
+    at[mesh.tail[dropped]] = True
+    at[mesh.head[dropped]] = True
+    kept = crease_halfedges(mesh, prune_branches(mesh, pairs, shortest, at))
+    return crease & ~kept
+
+
+def _cure(
+    matched: MatchedField, distance: float, size: Floats
+) -> tuple[MatchedField, Refinement, int]:
     """Every sector with the quads it needs; splits edges where vertices are too few."""
     total, count = no_refinement(matched.mesh), 0
     for _ in range(MOST_SPLITS):
-        matched, moved = cure_low_sectors(matched, distance)
+        matched, moved = cure_low_sectors(matched, distance, size[total.parent])
         count += moved
         if not low_sectors(matched).any():
             return matched, total, count

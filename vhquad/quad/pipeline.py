@@ -21,6 +21,7 @@ from vhquad.errors import ConfigError, FieldError, ParametrizationError
 from vhquad.field.align import AlignedField, AlignSettings, align_field
 from vhquad.field.cross import CrossField
 from vhquad.field.features import find_creases
+from vhquad.field.prune import prune_branches
 from vhquad.field.transport import to_faces
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.quad import QuadMesh
@@ -47,6 +48,7 @@ Ints = NDArray[np.int64]
 
 LEAST_QUADS = 6
 NEAR_COUNT = 1.10
+LOOSE_CREASE = 1.5  # quads; shorter creases that end loose are noise
 
 Progress = Callable[[str, float], None]
 
@@ -306,7 +308,8 @@ class _Attempt:
             return given
         if angle is None:
             return np.zeros((0, 2), dtype=np.int64)
-        return find_creases(mesh, angle, self.crease_length * length)
+        found = find_creases(mesh, angle, self.crease_length * length)
+        return prune_branches(mesh, found, LOOSE_CREASE * length)
 
 
 MAP = "integer-grid map"
