@@ -68,15 +68,15 @@ def find_plane(mesh: TriMesh, symmetry: str) -> tuple[MirrorPlane | None, Symmet
 
 def _report(asked: str, found: Symmetry, made: bool) -> SymmetryReport:
     off = (
-        f"half of the mirrored surface is more than {100 * found.median:.2g} % of the diagonal off"
+        f"half of the mirrored surface is {100 * found.median:.2g} % of the diagonal off or more, "
+        f"a twentieth {100 * found.tail:.2g} %"
     )
     warnings = []
     if not made:
         warnings.append(f"no mirror plane was found: in the best, {found.plane.name}, {off}")
     elif not found.holds:
         warnings.append(
-            f"the mesh is not symmetric in {found.plane.name} ({off} and a twentieth more than "
-            f"{100 * found.tail:.2g} %); one half was mirrored all the same"
+            f"one half was mirrored, but the mesh is not symmetric in {found.plane.name}: {off}"
         )
     return SymmetryReport(
         asked=asked,
