@@ -13,10 +13,9 @@ from vhquad.field.cancel import (
     cancel_pairs,
     cure_low_sectors,
     low_sectors,
-    move_indices,
-    relax,
 )
 from vhquad.field.cross import CrossField
+from vhquad.field.indices import move_indices, relax
 from vhquad.field.matching import MatchedField, match_field
 from vhquad.field.smooth import smoothest
 from vhquad.geometry.frames import face_axes, from_3d
@@ -163,3 +162,28 @@ def test_no_quad_gets_a_straight_corner_by_absorbing() -> None:
     made = move_indices(field, [path[::-1]])
     assert made.sector_quads[path[0]] == 3
     assert absorb_at_features(made, 0.09)[1] == 0
+
+
+def test_near_is_near_in_quads_of_the_place() -> None:
+    field = parallel(grid(12, 9))
+    moved = move_indices(field, [inner_path(field, 3)])  # 0.25 apart, at x from 0.25 to 0.5
+    none = np.zeros(field.n_sectors, dtype=bool)
+    for quad, expected in ((0.4, 0), (0.6, 1)):
+        size = np.full(field.mesh.n_faces, quad)
+        assert cancel_pairs(moved, 0.5, none, size)[1] == expected
+    # Small quads where the pair is, large ones elsewhere: the pair is far apart.
+    x = field.mesh.vertices[field.mesh.faces].mean(axis=1)[:, 0]
+    assert cancel_pairs(moved, 0.5, none, np.where(x < 0.6, 0.2, 2.0))[1] == 0
+
+
+def test_sizes_of_a_field_decide_which_pairs_stay() -> None:
+    mesh = blob(4)
+    rng = np.random.default_rng(4)
+    z = smoothest(mesh) * np.exp(2j * rng.normal(size=mesh.n_faces))
+    left = mesh.vertices[mesh.faces].mean(axis=1)[:, 0] < 0
+    size = np.where(left, 0.02, 0.3)
+    aligned = align_field(mesh, CrossField("faces", z, size))
+    check_aligned(mesh, aligned)
+    plain = ~aligned.sector_is_feature & (aligned.sector_quads != 4)
+    x = aligned.mesh.vertices[aligned.sector_vertex[plain], 0]
+    assert (x > 0.05).sum() < 20 < 100 < (x < -0.05).sum()

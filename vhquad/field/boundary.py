@@ -79,25 +79,26 @@ class _Loop:
         return int((np.searchsorted(ends, self.start + distance) - np.arange(n)).max()) + 1
 
 
-def boundary_tangents(mesh: TriMesh, edge_length: float) -> BoundaryTangents:
+def boundary_tangents(mesh: TriMesh, size: Floats | float) -> BoundaryTangents:
     """Find corners and smooth tangents of every boundary loop.
 
     Parameters
     ----------
     mesh : TriMesh
-    edge_length : float
-        Of the quads to come: half of it is the window that corners are judged by (at least two
-        boundary edges, at most a sixth of the loop).
+    size : (m,) float64, or float
+        Edge length of the quads to come. Half its mean along a loop is the window that corners are
+        judged by (at least two boundary edges, at most a sixth of the loop).
     """
     lean = np.zeros(3 * mesh.n_faces)
     corner = np.zeros(3 * mesh.n_faces, dtype=bool)
     length = mesh.edge_lengths.reshape(-1)
+    edge_length = np.broadcast_to(np.asarray(size, dtype=np.float64), mesh.n_faces)
     fan = label_sectors(mesh, mesh.twin < 0)[1]
     angle = np.bincount(fan, mesh.corner_angles.reshape(-1))
     for h in mesh.boundary_loops:  # few
         turns = np.pi - angle[fan[h]]  # at the tail of each halfedge
         loop = _Loop(length[h], np.cumsum(turns) - turns[0], float(turns.sum()))
-        window = max(0.5 * edge_length, 2.0 * loop.perimeter / len(h))
+        window = max(0.5 * float(edge_length[h // 3].mean()), 2.0 * loop.perimeter / len(h))
         window = min(window, loop.perimeter / 6.0)
         at = _corners(loop, window)
         corner[h[at]] = True

@@ -30,7 +30,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 LEAST_SMOOTHING = 1e-9  # of the mesh's diagonal
-REACH = 4.0  # edge lengths beyond which features do not weaken the given field
+REACH = 4.0  # sizes beyond which features do not weaken the given field
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +50,8 @@ class Posed:
     weight : (m,) float64
         Of staying near.
     fixed : (m,) bool
+    size : (m,) float64
+        Edge length of the quads to come.
     """
 
     mesh: TriMesh
@@ -59,12 +61,13 @@ class Posed:
     target: Complexes
     weight: Floats
     fixed: Bools
+    size: Floats
 
     def solve(self) -> Complexes:
         """The crosses of least energy, unit; (m,)."""
         return unit(relaxed(self.mesh, self.target, self.weight, self.fixed))
 
-    def settle(self, z: Complexes, length: float) -> Complexes:
+    def settle(self, z: Complexes, length: Floats) -> Complexes:
         """Crosses of less energy near unit ones, singularities moved by about ``length``; (m,)."""
         return settled(self.mesh, z, self.target, self.weight, self.fixed, length)
 
@@ -74,7 +77,7 @@ class Posed:
 
 
 def pose(
-    refinement: Refinement, feature: Bools, field: CrossField, edge_length: float, detail: float
+    refinement: Refinement, feature: Bools, field: CrossField, size: Floats, smoothing: float
 ) -> Posed:
     """Set up the problem.
 
@@ -86,36 +89,37 @@ def pose(
         Halfedges of that mesh on boundaries and creases.
     field : CrossField
         On its faces.
-    edge_length : float
-        Of the quads to come.
-    detail : float
-        Details of the field smaller than this are smoothed away.
+    size : (m,) float64
+        Edge length of the quads to come, at those faces.
+    smoothing : float
+        Details of the field smaller than this many sizes are smoothed away.
     """
     mesh = refinement.mesh
     feature = refinement.carry(feature, False)
-    boundary = boundary_tangents(mesh, edge_length)
+    size = size[refinement.parent]
+    boundary = boundary_tangents(mesh, size)
     on = np.flatnonzero(feature)
     target = field.z[refinement.parent] * np.exp(-4j * refinement.turn)
     target[on // 3] = np.exp(4j * (face_angles(mesh) + boundary.lean)[on])
     fixed = np.zeros(mesh.n_faces, dtype=bool)
     fixed[on // 3] = True
-    weight = mesh.face_areas / max(detail, LEAST_SMOOTHING * mesh.diagonal) ** 2
+    weight = mesh.face_areas / np.maximum(smoothing * size, LEAST_SMOOTHING * mesh.diagonal) ** 2
     if field.confidence is not None:
         weight = weight * field.confidence[refinement.parent]
-    weight = weight * (target != 0) * _distance_trust(mesh, on, edge_length)
-    return Posed(mesh, feature, boundary.lean, boundary.corner, target, weight, fixed)
+    weight = weight * (target != 0) * _distance_trust(mesh, on, size)
+    return Posed(mesh, feature, boundary.lean, boundary.corner, target, weight, fixed, size)
 
 
-def _distance_trust(mesh: TriMesh, on: Ints, length: float) -> Floats:
-    """How far the given field counts: 0 at features, 1 from about an edge length on; (m,)."""
+def _distance_trust(mesh: TriMesh, on: Ints, size: Floats) -> Floats:
+    """How far the given field counts: 0 at features, 1 from about a size on; (m,)."""
     if on.size == 0:
         return np.ones(mesh.n_faces)
     h = np.arange(3 * mesh.n_faces)
     once = h[(mesh.twin < 0) | (h < mesh.twin)]
     shape = (mesh.n_vertices, mesh.n_vertices)
-    lengths = mesh.edge_lengths.reshape(-1)[once]
+    lengths = mesh.edge_lengths.reshape(-1)[once] / size[once // 3]
     graph = csr_matrix((lengths, (mesh.tail[once], mesh.head[once])), shape)
     start = np.unique(np.concatenate([mesh.tail[on], mesh.head[on]]))
-    far = dijkstra(graph, directed=False, indices=start, limit=REACH * length, min_only=True)
-    far = np.minimum(far, REACH * length)[mesh.faces].mean(axis=1)
-    return np.asarray(1.0 - np.exp(-((far / length) ** 2)))
+    far = dijkstra(graph, directed=False, indices=start, limit=REACH, min_only=True)
+    far = np.minimum(far, REACH)[mesh.faces].mean(axis=1)
+    return np.asarray(1.0 - np.exp(-(far**2)))

@@ -7,7 +7,7 @@ on as the one of ``g`` that is ``p`` quarter turns before the chosen one::
     phi_g - phi_f = p * pi/2 + jump[h],    rotation[h] = -p mod 4,    z_g = i**rotation[h] * z_f + t
 
 with ``z = u + iv`` a map whose u axis follows the chosen direction. A plain matching takes
-``|jump| <= pi/4``; moving a singularity (``vhquad.field.cancel``) changes ``p`` instead and lets
+``|jump| <= pi/4``; moving a singularity (``vhquad.field.indices``) changes ``p`` instead and lets
 ``jump`` say so, which is why ``jump``, not ``p``, is what is kept.
 
 On a feature halfedge (boundary or crease) the map's isoline leans off the edge by ``lean[h]``

@@ -95,7 +95,7 @@ def settled(
     target: Complexes,
     weight: Floats,
     fixed: NDArray[np.bool_],
-    length: float,
+    length: Floats,
 ) -> Complexes:
     """Lower the energy of unit crosses among unit crosses, by diffusing and normalising in turn.
 
@@ -109,8 +109,8 @@ def settled(
         Unit crosses to start from.
     target, weight, fixed
         As in :func:`relaxed`.
-    length : float
-        Diffusion length of a step.
+    length : (m,) float64
+        Diffusion length of a step at each face.
 
     References
     ----------
@@ -122,7 +122,7 @@ def settled(
         return z
     rows = _energy(mesh)[free]
     pull = weight[free] * target[free] - rows @ np.where(fixed, target, 0.0)
-    hold = mesh.face_areas[free] / length**2
+    hold = (mesh.face_areas / length**2)[free]
     solve = factorized(rows[:, free] + diags(weight[free] + hold))
     for _ in range(SETTLING_STEPS):
         z[free] = unit(solve(pull + hold * z[free]))
