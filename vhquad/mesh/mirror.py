@@ -181,10 +181,17 @@ def mirror_faces(
 
 def _component_sides(mesh: TriMesh, plane: MirrorPlane) -> Ints:
     """Side of the plane that each component is on: 1, -1, or 0 if the plane cuts it; (c,)."""
-    above = plane.height(mesh.vertices[mesh.faces].mean(axis=1)) > 0
+    height = plane.height(mesh.vertices)[mesh.faces]
+    above = height > 0
+    few = np.where(above.sum(axis=1) == 2, 2, 1)  # the corners of the side with less of them
+    alone = (above == (few == 1)[:, None]).argmax(axis=1)
+    a, b, c = np.take_along_axis(height, (alone[:, None] + np.arange(3)) % 3, axis=1).T
+    mixed = above.any(axis=1) & ~above.all(axis=1)
+    tip = np.divide(a * a, (a - b) * (a - c), out=np.zeros_like(a), where=mixed)
+    share = np.where(mixed, np.where(few == 1, tip, 1.0 - tip), above.all(axis=1))
     total = np.bincount(mesh.face_component, mesh.face_areas)
-    share = np.bincount(mesh.face_component, mesh.face_areas * above) / total
-    return np.where(share < _CROSSING, -1, np.where(share > 1.0 - _CROSSING, 1, 0))
+    part = np.bincount(mesh.face_component, mesh.face_areas * share) / total
+    return np.where(part < _CROSSING, -1, np.where(part > 1.0 - _CROSSING, 1, 0))
 
 
 def _without_partner(mesh: TriMesh, plane: MirrorPlane, side: Ints, kept: int) -> tuple[Ints, int]:

@@ -33,7 +33,8 @@ _SAMPLES = 2000
 _FEW = 300  # samples for the first look at a candidate
 _DIRECTIONS = 100
 _PROMISING = 6.0  # times LARGEST_MEDIAN; a candidate worse than that is not refined
-_STEPS = 12
+_STEPS = 20
+_BLUR = 0.002  # share of the diagonal within which all samples count in full
 _CLEAN = 0.01  # a plane this near (radians, share of the diagonal) a coordinate plane may become it
 _TIE = 0.0005  # scores that differ less count as equal
 
@@ -152,7 +153,7 @@ class _Search:
         across = np.linalg.svd(n[None])[2][1:] if tilt else np.zeros((0, 3))
         turning = [((p - foot) @ e) * (m @ n) + plane.height(p) * (m @ e) for e in across]
         jacobian = np.stack([2.0 * (m @ n), *(-2.0 * t / size for t in turning)], axis=1)
-        scale = 4.0 * np.median(hits.distance) + 1e-6 * size
+        scale = 4.0 * np.median(hits.distance) + _BLUR * size
         weight = 1.0 / (1.0 + (hits.distance / scale) ** 2) ** 2
         matrix = (jacobian * weight[:, None]).T @ jacobian
         # The damping: every plane through the middle of a sphere is as good as any other.
