@@ -156,6 +156,7 @@ def align_field(
     field: CrossField,
     creases: ArrayLike | None = None,
     settings: AlignSettings | None = None,
+    seam: Bools | None = None,
 ) -> AlignedField:
     """Polish, align, match and clean a cross field.
 
@@ -167,6 +168,9 @@ def align_field(
     creases : (k, 2) array_like of int, optional
         Edges, as pairs of vertices, that quad edges must follow.
     settings : AlignSettings, optional
+    seam : (3m,) bool, optional
+        Boundary halfedges beyond which the surface goes on, mirrored: vertices within them get
+        at least two quads, so that the whole has no doublet there.
 
     Raises
     ------
@@ -190,7 +194,7 @@ def align_field(
     n_creases = _count_creases(mesh, feature)
     while True:
         first = separate_features(mesh, feature)
-        posed = pose(first, feature, field, size, settings.smoothing)
+        posed = pose(first, feature, field, size, settings.smoothing, seam)
         z = posed.solve()
         blunt = hopeless_creases(posed.match(z), SHORTEST_CREASE * length)
         if not blunt.any():

@@ -79,7 +79,9 @@ class _Loop:
         return int((np.searchsorted(ends, self.start + distance) - np.arange(n)).max()) + 1
 
 
-def boundary_tangents(mesh: TriMesh, size: Floats | float) -> BoundaryTangents:
+def boundary_tangents(
+    mesh: TriMesh, size: Floats | float, seam: Bools | None = None
+) -> BoundaryTangents:
     """Find corners and smooth tangents of every boundary loop.
 
     Parameters
@@ -88,6 +90,9 @@ def boundary_tangents(mesh: TriMesh, size: Floats | float) -> BoundaryTangents:
     size : (m,) float64, or float
         Edge length of the quads to come. Half its mean along a loop is the window that corners are
         judged by (at least two boundary edges, at most a sixth of the loop).
+    seam : (3m,) bool, optional
+        Boundary halfedges beyond which the surface goes on, mirrored: within them there is no
+        convex corner, however sharp.
     """
     lean = np.zeros(3 * mesh.n_faces)
     corner = np.zeros(3 * mesh.n_faces, dtype=bool)
@@ -101,6 +106,8 @@ def boundary_tangents(mesh: TriMesh, size: Floats | float) -> BoundaryTangents:
         window = max(0.5 * float(edge_length[h // 3].mean()), 2.0 * loop.perimeter / len(h))
         window = min(window, loop.perimeter / 6.0)
         at = _corners(loop, window)
+        if seam is not None:
+            at = at[~(seam[h[at]] & seam[h[at - 1]] & (turns[at] > 0))]
         corner[h[at]] = True
         first = int(at[0]) if at.size else 0
         rolled, segment = loop.rolled(first), np.zeros(len(h), dtype=np.int64)

@@ -19,6 +19,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 LEAST_INNER = 3  # fewer quads around an interior vertex would make doublets
+LEAST_SEAM = 2  # and as many in the mirror
 WIDEST_CORNER = np.radians(150.0)
 LEAST_CORNER = np.radians(50.0)  # of a quad at a feature that takes a singularity
 MOST_CORNER = np.radians(130.0)
@@ -82,7 +83,7 @@ def absorb_at_features(
     quads, feature = matched.sector_quads.copy(), matched.sector_is_feature
     angle = np.bincount(matched.corner_sector, matched.mesh.corner_angles.reshape(-1))
     roomy = feature & (quads == 2) & (angle >= 3 * LEAST_CORNER)
-    tight = feature & (quads == 2) & (angle <= MOST_CORNER)
+    tight = feature & (quads == 2) & (angle <= MOST_CORNER) & ~matched.sector_in_seam
     graph = sector_graph(matched, size)
     found = [(path, 1) for path in near_pairs(graph, roomy, ~feature & (quads > 4), distance)]
     found += [(path, -1) for path in near_pairs(graph, tight, ~feature & (quads < 4), distance)]
@@ -111,7 +112,7 @@ def cure_low_sectors(
 
     An interior vertex needs three, on creases too, since two quads around it could not be convex:
     an index of 1/2 becomes two of 1/4. A boundary or crease sector needs as many as keep their
-    corners below 150 degrees.
+    corners below 150 degrees, one within a seam two, which its mirror image makes four.
 
     Parameters
     ----------
@@ -155,6 +156,7 @@ def _least_quads(matched: MatchedField) -> Ints:
     feature, vertex = matched.sector_is_feature, matched.sector_vertex
     angle = np.bincount(matched.corner_sector, matched.mesh.corner_angles.reshape(-1))
     fitting = np.maximum(np.ceil(angle / WIDEST_CORNER - 1e-9), 1.0).astype(np.int64)
+    fitting = np.where(matched.sector_in_seam, np.maximum(fitting, LEAST_SEAM), fitting)
     least = np.where(feature, fitting, LEAST_INNER)
 
     # An inner vertex on creases has several sectors, which must make up for each other.

@@ -52,6 +52,8 @@ class Posed:
     fixed : (m,) bool
     size : (m,) float64
         Edge length of the quads to come.
+    seam : (3m,) bool, optional
+        Boundary halfedges beyond which the surface goes on, mirrored.
     """
 
     mesh: TriMesh
@@ -62,6 +64,7 @@ class Posed:
     weight: Floats
     fixed: Bools
     size: Floats
+    seam: Bools | None = None
 
     def solve(self) -> Complexes:
         """The crosses of least energy, unit; (m,)."""
@@ -73,11 +76,16 @@ class Posed:
 
     def match(self, z: Complexes) -> MatchedField:
         """Crosses with their matchings."""
-        return match_field(self.mesh, np.angle(z) / 4.0, self.feature, self.lean)
+        return match_field(self.mesh, np.angle(z) / 4.0, self.feature, self.lean, self.seam)
 
 
 def pose(
-    refinement: Refinement, feature: Bools, field: CrossField, size: Floats, smoothing: float
+    refinement: Refinement,
+    feature: Bools,
+    field: CrossField,
+    size: Floats,
+    smoothing: float,
+    seam: Bools | None = None,
 ) -> Posed:
     """Set up the problem.
 
@@ -93,11 +101,15 @@ def pose(
         Edge length of the quads to come, at those faces.
     smoothing : float
         Details of the field smaller than this many sizes are smoothed away.
+    seam : (3m,) bool, optional
+        Boundary halfedges beyond which the surface goes on, mirrored.
     """
     mesh = refinement.mesh
+    if seam is not None:
+        seam = refinement.carry(seam, False)
     feature = refinement.carry(feature, False)
     size = size[refinement.parent]
-    boundary = boundary_tangents(mesh, size)
+    boundary = boundary_tangents(mesh, size, seam)
     on = np.flatnonzero(feature)
     target = field.z[refinement.parent] * np.exp(-4j * refinement.turn)
     target[on // 3] = np.exp(4j * (face_angles(mesh) + boundary.lean)[on])
@@ -107,7 +119,7 @@ def pose(
     if field.confidence is not None:
         weight = weight * field.confidence[refinement.parent]
     weight = weight * (target != 0) * _distance_trust(mesh, on, size)
-    return Posed(mesh, feature, boundary.lean, boundary.corner, target, weight, fixed, size)
+    return Posed(mesh, feature, boundary.lean, boundary.corner, target, weight, fixed, size, seam)
 
 
 def _distance_trust(mesh: TriMesh, on: Ints, size: Floats) -> Floats:

@@ -64,6 +64,8 @@ class MatchedField:
         Angle from a feature halfedge to the isoline that stands for it; 0 elsewhere.
     jump : (3m,) float64
         What the matching leaves over across a non-feature halfedge; 0 on features.
+    seam : (3m,) bool, optional
+        Boundary halfedges beyond which the surface goes on, mirrored.
     """
 
     mesh: TriMesh
@@ -71,6 +73,7 @@ class MatchedField:
     feature: Bools
     lean: Floats
     jump: Floats
+    seam: Bools | None = None
 
     # ---- matchings ------------------------------------------------------------------------
 
@@ -136,6 +139,15 @@ class MatchedField:
         return flag
 
     @cached_property
+    def sector_in_seam(self) -> Bools:
+        """Sectors between two halfedges of a seam: mirrored, they are full fans; (s,)."""
+        if self.seam is None:
+            return np.zeros(self.n_sectors, dtype=bool)
+        return self.touched(self.seam) & self.touched(
+            np.roll(self.seam.reshape(-1, 3), 1, 1).ravel()
+        )
+
+    @cached_property
     def sector_turns(self) -> Floats:
         """``quads`` of each sector before rounding: integers up to rounding errors; (s,)."""
         every = np.arange(len(self.feature))
@@ -168,6 +180,7 @@ class MatchedField:
             feature=step.carry(self.feature, False),
             lean=step.carry(self.lean, 0.0),
             jump=step.carry(self.jump, 0.0),
+            seam=None if self.seam is None else step.carry(self.seam, False),
         )
 
 
@@ -181,7 +194,9 @@ def label_sectors(mesh: TriMesh, feature: Bools) -> tuple[int, Ints]:
     return int(count), label.astype(np.int64)
 
 
-def match_field(mesh: TriMesh, angle: Floats, feature: Bools, lean: Floats) -> MatchedField:
+def match_field(
+    mesh: TriMesh, angle: Floats, feature: Bools, lean: Floats, seam: Bools | None = None
+) -> MatchedField:
     """Match every face's cross with its neighbours' by the smallest turn.
 
     Parameters
@@ -193,13 +208,15 @@ def match_field(mesh: TriMesh, angle: Floats, feature: Bools, lean: Floats) -> M
         Feature halfedges; must hold every boundary halfedge and both halfedges of a crease.
     lean : (3m,) float64
         See :class:`MatchedField`.
+    seam : (3m,) bool, optional
+        See :class:`MatchedField`.
     """
     change = _relative_change(mesh, angle)
     left_over = change - QUARTER * np.rint(change / QUARTER)
     # One halfedge of an edge decides, so that ties cannot be decided two ways.
     decides = np.arange(len(feature)) > mesh.twin
     jump = np.where(decides, left_over, -left_over[mesh.twin])
-    return MatchedField(mesh, angle, feature, lean, np.where(feature, 0.0, jump))
+    return MatchedField(mesh, angle, feature, lean, np.where(feature, 0.0, jump), seam)
 
 
 def _relative_change(mesh: TriMesh, angle: Floats) -> Floats:

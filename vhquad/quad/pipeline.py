@@ -45,6 +45,7 @@ from vhquad.report import ComponentReport, MeshCounts, RemeshReport, SymmetryRep
 __all__ = ["RemeshResult", "RemeshSettings", "UvMap", "remesh_mesh"]
 
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 LEAST_QUADS = 6
 NEAR_COUNT = 1.10
@@ -230,8 +231,10 @@ def _remesh(
 ) -> tuple[QuadMesh, list[Part], SymmetryReport | None]:
     """Quads of the whole mesh; of one half and its mirror image, if there is a plane for it."""
 
-    def remesh_parts(half: TriMesh, own: CrossField, creases: Ints | None) -> list[Part]:
-        return _remesh_parts(half, own, creases, settings.crease, with_uv, progress)
+    def remesh_parts(
+        half: TriMesh, own: CrossField, creases: Ints | None, seam: Bools | None
+    ) -> list[Part]:
+        return _remesh_parts(half, own, creases, seam, settings.crease, with_uv, progress)
 
     symmetry: SymmetryReport | None = None
     if settings.symmetry != "off":
@@ -244,7 +247,7 @@ def _remesh(
                 return mirrored.quads, mirrored.parts, symmetry
             except ParametrizationError as problem:
                 symmetry = symmetry.given_up(str(problem))
-    parts = remesh_parts(mesh, field, given)
+    parts = remesh_parts(mesh, field, given, None)
     return join_quads([part.quads for part in parts]), parts, symmetry
 
 
@@ -252,6 +255,7 @@ def _remesh_parts(
     mesh: TriMesh,
     field: CrossField,
     given: Ints | None,
+    seam: Bools | None,
     angle: float | None,
     with_uv: bool,
     progress: Progress | None,
@@ -282,7 +286,8 @@ def _remesh_parts(
             None if field.confidence is None else field.confidence[inside],
         )
         target = max(round(float(density[inside].sum())), LEAST_QUADS)
-        parts.append(_remesh_part(part, part_field, own, angle, target, with_uv, tell))
+        edge = None if seam is None else seam.reshape(-1, 3)[inside].reshape(-1)
+        parts.append(_remesh_part(part, part_field, own, edge, angle, target, with_uv, tell))
     return parts
 
 
@@ -325,6 +330,7 @@ def _remesh_part(
     mesh: TriMesh,
     field: CrossField,
     given: Ints | None,
+    seam: Bools | None,
     angle: float | None,
     target: int,
     with_uv: bool,
@@ -339,7 +345,7 @@ def _remesh_part(
     for attempt in _ATTEMPTS:
         creases = attempt.creases(mesh, given, angle, length)
         try:
-            mapped = _by_map(mesh, field, creases, target, attempt, surface, watch, tell)
+            mapped = _by_map(mesh, field, creases, seam, target, attempt, surface, watch, tell)
         except (ParametrizationError, FieldError) as problem:
             reasons.append(str(problem))
             continue
@@ -380,6 +386,7 @@ def _by_map(
     mesh: TriMesh,
     field: CrossField,
     creases: Ints,
+    seam: Bools | None,
     target: int,
     attempt: _Attempt,
     surface: ClosestPoints,
@@ -397,7 +404,7 @@ def _by_map(
     length = float(np.sqrt(mesh.area / target))
     with watch("align"):
         settings = AlignSettings(edge_length=length, smoothing=attempt.smoothing)
-        aligned = align_field(mesh, field, creases, settings)
+        aligned = align_field(mesh, field, creases, settings, seam)
     tell("map", 0.15)
     with watch("map"):
         seamless = solve_seamless_map(aligned)

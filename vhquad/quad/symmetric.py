@@ -30,7 +30,7 @@ _ON = 1e-9
 """Boundary vertices of the quads nearer to the plane than this share of the diagonal are on it."""
 
 
-Remesher = Callable[[TriMesh, CrossField, Ints | None], list[Part]]
+Remesher = Callable[[TriMesh, CrossField, "Ints | None", "Bools | None"], list[Part]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +109,8 @@ def remesh_mirrored(
         Edges to keep.
     plane : MirrorPlane
     remesh_parts : callable
-        Makes quads of every component of a mesh.
+        Makes quads of every component of a mesh, given the field, edges to keep, and boundary
+        halfedges at which the surface goes on, mirrored.
 
     Raises
     ------
@@ -123,7 +124,8 @@ def remesh_mirrored(
     own = to_half(mesh, with_mirror_image(mesh, field, plane), half)
     count = 2.0 * float((half.mesh.face_areas / _sizes(own) ** 2).sum())
     own = replace(own, size=_sizes(own) * np.sqrt(count / wanted))
-    parts = remesh_parts(half.mesh, own, None if creases is None else half.carry_edges(creases))
+    pairs = None if creases is None else half.carry_edges(creases)
+    parts = remesh_parts(half.mesh, own, pairs, half.seam)
     on = [_on_plane(p.quads, half) & cut for p, cut in zip(parts, half.is_cut, strict=True)]
     quads = join_quads([part.quads for part in parts])
     quads = QuadMesh(*mirror_faces(quads.vertices, quads.quads, np.concatenate(on), plane))
