@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import resource
 import signal
 import time
@@ -111,11 +112,16 @@ def test_without_a_terminal_progress_is_silent(capsys: pytest.CaptureFixture[str
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_leaves_nothing(tmp_path: Path, number: signal.Signals) -> None:
-    """Stopped in the middle of a long remesh, a program of its own leaves its input only."""
+    """Stopped in the middle of a long remesh, a program of its own leaves its input only.
+
+    The input is a pipe, so the test knows when it has been read.
+    """
     mesh = blob(6)
-    source = write_obj(tmp_path / "blob.obj", mesh.vertices, mesh.faces)
-    process = program("remesh", source, "--method", "curvature", "--out", tmp_path / "q.obj")
-    time.sleep(3.0)
+    pipe = tmp_path / "blob.obj"
+    os.mkfifo(pipe)
+    process = program("remesh", pipe, "--method", "curvature", "--out", tmp_path / "q.obj")
+    write_obj(pipe, mesh.vertices, mesh.faces)
+    time.sleep(1.0)
     assert process.poll() is None, "the remesh was over before the signal"
     process.send_signal(number)
     out, err = process.communicate(timeout=60)

@@ -1,6 +1,11 @@
 """``python -m vhquad``: the command line."""
 
-from vhquad.cli.app import main
+import sys
 
 if __name__ == "__main__":
-    main()
+    try:
+        from vhquad.cli.app import main
+
+        main()
+    except KeyboardInterrupt:  # before `main` could take care of it
+        sys.exit(130)
