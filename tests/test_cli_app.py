@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import os
 import signal
+import sys
 import time
 from pathlib import Path
 
@@ -131,3 +133,24 @@ def test_a_signal_leaves_nothing(tmp_path: Path, number: signal.Signals) -> None
     assert "Traceback" not in err
     assert out == ""
     assert [p.name for p in tmp_path.iterdir()] == ["blob.obj"]
+
+
+def test_progress_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What runs, how far, and a clock that goes on after a step is done."""
+
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    screen = Terminal()
+    monkeypatch.setattr(sys, "stderr", screen)
+    monkeypatch.setenv("TERM", "xterm")
+    with Progress(False, "starting") as progress:
+        progress("first step", 1.0, "note")
+        time.sleep(1.1)
+        progress("second step")
+        time.sleep(0.3)
+    text = screen.getvalue()
+    assert "second step" in text
+    assert "note" in text
+    assert text.rindex("0:00:01") > text.rindex("first step")

@@ -46,6 +46,5 @@ class Progress:
     def __call__(self, what: str, share: float | None = None, note: str = "") -> None:
         """Say what runs now."""
         total = None if share is None else 1.0
-        self._bar.update(
-            self._task, description=what, total=total, completed=share or 0.0, note=note
-        )
+        done = min(share or 0.0, 0.999)  # a finished bar would stop its clock
+        self._bar.update(self._task, description=what, total=total, completed=done, note=note)
