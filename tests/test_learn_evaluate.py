@@ -22,8 +22,10 @@ def test_rows(tmp_path: Path) -> None:
     (tmp_path / "in" / "split.json").write_text('{"ring0": "test", "ring1": "test"}')
     dataset = preprocess(tmp_path / "in", tmp_path / "out", SETTINGS, 1)
     rows = evaluate(Model(VectorHeatNet(MODEL)), dataset.folder)
-    found = {row.method.split()[0]: row for row in rows if row.group == "whole"}
-    assert set(found) == {"model", "random", "principal", "curvature-aligned"}
+    found = {row.method.split(" 0.")[0]: row for row in rows if row.group == "whole"}
+    methods = {"model", "model + curvature", "random", "principal", "curvature-aligned"}
+    assert set(found) == methods
+    assert found["model + curvature"].direction < 0.1  # random weights earn no confidence
     assert found["random"].direction == pytest.approx(1.0, abs=0.15)
     assert found["random"].mean_angle == pytest.approx(22.5, abs=2.0)
     assert found["principal"].direction < 0.1

@@ -68,8 +68,8 @@ def predict(
     model : Model or path, optional
         A trained model; the shipped one if not given.
     method : "learned" or "curvature"
-        The network, or the smoothest field along the directions of curvature, which needs no
-        model and has no sizes.
+        The network, helped out by the smoothest field along the directions of curvature where it
+        is not sure; or the latter alone, which needs no model and has no sizes.
     resolution : "auto" or "full"
         "auto" predicts large components on a decimated copy and carries the field back.
     device : str
@@ -82,7 +82,8 @@ def predict(
     Returns
     -------
     CrossField
-        On vertices if predicted, on faces along the curvature.
+        On vertices if predicted, on faces along the curvature; the confidence says how clear the
+        directions are.
 
     Raises
     ------
@@ -95,13 +96,15 @@ def predict(
         if model is not None:
             raise ConfigError("a model was given, but the method curvature uses none")
         return curvature_field(mesh)
+    from vhquad.learn.blend import lean_on_curvature
     from vhquad.learn.predict import predict_field
 
     def on_component(done: int, count: int) -> None:
         if progress is not None:
             progress("predicting the field", done / count)
 
-    return predict_field(mesh, model, resolution, device, cache=cache, on_component=on_component)
+    field = predict_field(mesh, model, resolution, device, cache=cache, on_component=on_component)
+    return lean_on_curvature(mesh, field)
 
 
 def remesh(
@@ -289,10 +292,16 @@ def describe_field(
 ) -> FieldReport:
     """Figures of a field on a mesh."""
     singular = find_singularities(mesh, field)
-    size, quads = None, None
+    size, quads, trust = None, None, None
+    area = mesh.face_areas if field.domain == "faces" else mesh.vertex_areas
+    if field.confidence is not None:
+        share = area / area.sum()
+        trust = {
+            "mean": float(share @ field.confidence),
+            "below_half": float(share @ (field.confidence < 0.5)),
+        }
     if field.size is not None:
         known = field.size > 0
-        area = mesh.face_areas if field.domain == "faces" else mesh.vertex_areas
         if known.any():
             values = field.size[known]
             size = {
@@ -309,6 +318,7 @@ def describe_field(
         index_sum=singular.total,
         size=size,
         quads=quads,
+        trust=trust,
         repair=tuple(repair_lines),
         seconds=dict(seconds or {}),
     )

@@ -303,6 +303,8 @@ class FieldReport:
         "least", "median" and "largest" edge length of the quads wanted, in units of the mesh.
     quads : int or None
         Quads that these sizes amount to.
+    trust : dict of str to float, or None
+        "mean" confidence over the area, and the share "below_half"; None if the field has none.
     lost : str
         What the file's format does not keep.
     repair : tuple of str
@@ -315,6 +317,7 @@ class FieldReport:
     index_sum: float
     size: Mapping[str, float] | None = None
     quads: int | None = None
+    trust: Mapping[str, float] | None = None
     lost: str = ""
     repair: tuple[str, ...] = ()
     seconds: Mapping[str, float] = field(default_factory=dict)

@@ -128,6 +128,9 @@ def _field_table(report: FieldReport, target: str | None) -> Table:
         table.add_row("quad edge length", f"{low:.4g} to {high:.4g}, median {middle:.4g}")
     if report.quads is not None:
         table.add_row("quads these sizes make", f"{report.quads:,}")
+    if report.trust is not None:
+        mean, low = report.trust["mean"], report.trust["below_half"]
+        table.add_row("clear directions", f"{mean:.0%}  (under half: {low:.0%} of the area)")
     if report.lost:
         table.add_row("this format", report.lost)
     _seconds_rows(table, report.seconds)

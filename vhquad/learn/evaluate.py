@@ -3,7 +3,7 @@
 All figures are means over meshes of means over the surface, weighted by area times coherence, in
 groups by the samples' variant ("whole", "cropped", ...). The spread is the standard deviation over
 all vertices, weighted likewise, as in the paper's table. A random field scores 1.0 and
-22.5 degrees.
+22.5 degrees. "model" is the network alone, "model + curvature" what `vhquad predict` answers.
 """
 
 from __future__ import annotations
@@ -20,9 +20,12 @@ from numpy.typing import NDArray
 from vhquad.errors import DatasetError
 from vhquad.field.cross import CrossField
 from vhquad.learn.baselines import LENGTHS, curvature_aligned, principal, random_field
-from vhquad.learn.dataset import Dataset, SampleEntry, Split, open_dataset
+from vhquad.learn.blend import lean_on_curvature
+from vhquad.learn.confidence import confidence
+from vhquad.learn.dataset import Split, open_dataset
 from vhquad.learn.device import choose_device
 from vhquad.learn.predict import predict_input
+from vhquad.mesh.triangle import TriMesh
 from vhquad.nn.checkpoint import Model, load_model
 
 __all__ = ["EvaluationRow", "compare", "evaluate"]
@@ -78,8 +81,8 @@ def evaluate(
     datasets : path or list of paths
     split : "train", "val" or "test"
     baselines : bool
-        Whether to measure random, principal and curvature-aligned fields too. Of the latter's
-        smoothing lengths the best on these very samples is kept.
+        Whether to measure the blend with curvature, and random, principal and curvature-aligned
+        fields too. Of the latter's smoothing lengths the best on these very samples is kept.
     device : str
     on_sample : callable, optional
         Called with (samples done, samples).
@@ -113,7 +116,11 @@ def evaluate(
         answer = predict_input(network, dataset.load(entry).input.to(target))
         fields = {"model": CrossField("vertices", answer.z, answer.size)}
         if baselines:
-            fields |= _baselines(dataset, entry, place)
+            mesh = dataset.mesh(entry)
+            trust = confidence(mesh, answer.agreement)
+            predicted = CrossField("vertices", answer.z, answer.size, trust)
+            fields["model + curvature"] = lean_on_curvature(mesh, predicted)
+            fields |= _baselines(mesh, place)
         truth, mass = dataset.truth_field(entry), dataset.archive(entry)["mass"]
         for method, field in fields.items():
             errors.setdefault(method, []).append((entry.variant, compare(field, truth, mass)))
@@ -140,8 +147,7 @@ def compare(field: CrossField, truth: CrossField, mass: Floats) -> _Errors:
     return _Errors(weight, cosine, relative)
 
 
-def _baselines(dataset: Dataset, entry: SampleEntry, seed: int) -> dict[str, CrossField]:
-    mesh = dataset.mesh(entry)
+def _baselines(mesh: TriMesh, seed: int) -> dict[str, CrossField]:
     aligned = zip(LENGTHS, curvature_aligned(mesh), strict=True)
     return {
         "random": random_field(mesh, np.random.default_rng(seed)),

@@ -1,8 +1,9 @@
 """From a mesh to the cross field that a trained network sees in it.
 
 Each connected component is predicted by itself. The answers for the mesh and for its mirror image
-are averaged, which makes a symmetric shape's field symmetric. Components above some size are
-predicted on a decimated proxy and the field is carried back (``resolution="full"`` prevents that).
+are averaged, which makes a symmetric shape's field symmetric, and how far they agree makes the
+confidence. Components above some size are predicted on a decimated proxy and the field is carried
+back (``resolution="full"`` prevents that).
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from vhquad.errors import ConfigError, ModelError
 from vhquad.field.cross import CrossField
 from vhquad.geometry.operators import OperatorSettings, load_or_build
+from vhquad.learn.confidence import agreement, confidence
 from vhquad.learn.device import choose_device
 from vhquad.learn.proxy import carry_back, make_proxy
 from vhquad.mesh.triangle import TriMesh
@@ -45,10 +47,14 @@ class Prediction:
         N-th power of the direction, not normalised.
     size : (n,) float64
         Length in units of the mesh.
+    agreement : (n,) float64
+        cos of the angle between the answers for the mesh and for its mirror image, in [-1, 1];
+        1 for a network that cannot tell one from the other.
     """
 
     z: NDArray[np.complex128]
     size: NDArray[np.float64]
+    agreement: NDArray[np.float64]
 
 
 def predict_field(
@@ -80,7 +86,8 @@ def predict_field(
     Returns
     -------
     CrossField
-        On the vertices. z is 0, and the size too, on components without area.
+        On the vertices, with the confidence of :mod:`vhquad.learn.confidence`. All is 0 on
+        components without area.
 
     Raises
     ------
@@ -101,7 +108,7 @@ def predict_field(
     target = choose_device(device)
     network = chosen.network.to(target)
     z = np.zeros(mesh.n_vertices, dtype=np.complex128)
-    size = np.zeros(mesh.n_vertices)
+    size, trust = np.zeros(mesh.n_vertices), np.zeros(mesh.n_vertices)
 
     def on_surface(surface: TriMesh) -> CrossField:
         settings = operator_settings(chosen.settings)
@@ -114,7 +121,8 @@ def predict_field(
             k=chosen.settings.k,
         )
         answer = predict_input(network, given.to(target))
-        return CrossField("vertices", answer.z, answer.size)
+        trusted = confidence(surface, answer.agreement)
+        return CrossField("vertices", answer.z, answer.size, trusted)
 
     count = mesh.n_components
     for label in range(count):  # components are few
@@ -133,9 +141,11 @@ def predict_field(
             z[used] = field.z
             if field.size is not None:
                 size[used] = field.size
+            if field.confidence is not None:
+                trust[used] = field.confidence
         if on_component is not None:
             on_component(label + 1, count)
-    return CrossField("vertices", z, size)
+    return CrossField("vertices", z, size, trust)
 
 
 def predict_input(network: VectorHeatNet, mesh: NetworkInput) -> Prediction:
@@ -144,7 +154,8 @@ def predict_input(network: VectorHeatNet, mesh: NetworkInput) -> Prediction:
     with torch.inference_mode():
         own, other = network(mesh), network(mesh.mirror_image())
     size = torch.sqrt(own.size * other.size).cpu().double().numpy() * mesh.length
-    return Prediction(0.5 * (unstack(own.z) + unstack(other.z)), np.asarray(size))
+    z, mirrored = unstack(own.z), unstack(other.z)
+    return Prediction(0.5 * (z + mirrored), np.asarray(size), agreement(z, mirrored))
 
 
 def operator_settings(settings: ModelSettings) -> OperatorSettings:

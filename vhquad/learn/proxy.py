@@ -50,6 +50,9 @@ def carry_back(proxy: TriMesh, field: CrossField, mesh: TriMesh) -> CrossField:
     in_face = field.z[proxy.faces] * frames.vertex_to_face**4
     z = hits.interpolate(in_face)
     size = None if field.size is None else hits.interpolate(field.size[proxy.faces])
+    confidence = None
+    if field.confidence is not None:
+        confidence = hits.interpolate(field.confidence[proxy.faces]).clip(0.0, 1.0)
     u = np.exp(0.25j * np.angle(z))
     axes = face_axes(proxy)
     there = type(axes)(axes.e1[hits.face], axes.e2[hits.face])
@@ -57,4 +60,5 @@ def carry_back(proxy: TriMesh, field: CrossField, mesh: TriMesh) -> CrossField:
     here = from_3d(vectors, vertex_axes(mesh))
     length = np.abs(here)
     unit = np.divide(here, length, out=np.zeros_like(here), where=length > 0)
-    return CrossField("vertices", np.where(z != 0, (unit**4).sum(axis=1), 0.0), size)
+    z = np.where(z != 0, (unit**4).sum(axis=1), 0.0)
+    return CrossField("vertices", z, size, confidence)

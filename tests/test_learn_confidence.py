@@ -1,0 +1,142 @@
+"""Confidence of predictions, and the blend with the curvature-aligned field."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.data_paths import ROOT
+from tests.meshes import blob, cube, icosphere, merge, moved, random_rigid, relabel, torus
+from vhquad import api
+from vhquad.errors import ModelError
+from vhquad.field.baseline import curvature_field
+from vhquad.field.cross import CrossField
+from vhquad.field.transport import to_vertices
+from vhquad.learn.blend import blend, lean_on_curvature
+from vhquad.learn.confidence import agreement, confidence
+from vhquad.learn.predict import predict_field
+from vhquad.learn.proxy import carry_back, make_proxy
+from vhquad.mesh.triangle import TriMesh
+from vhquad.nn.checkpoint import Model, load_model
+
+
+@pytest.fixture(scope="module")
+def shipped() -> Model:
+    """The shipped model."""
+    try:
+        return load_model()
+    except ModelError:
+        pytest.skip("no model is shipped")
+
+
+def mean(mesh: TriMesh, field: CrossField) -> float:
+    assert field.confidence is not None
+    return float(mesh.vertex_areas @ field.confidence / mesh.area)
+
+
+def test_agreement_by_hand() -> None:
+    """1. The cosine whatever the moduli; nothing agrees with nothing."""
+    own = np.array([2.0, 1j, -1.0, 0.0])
+    np.testing.assert_allclose(agreement(own, np.array([3.0, 1.0, 1.0, 1.0])), [1.0, 0.0, -1.0, 0])
+
+
+@pytest.mark.parametrize("level", [-1.0, 0.0, 0.6, 0.96, 1.0])
+def test_even_agreement(level: float) -> None:
+    """2. In [0, 1], nothing up to the lower bound, all of it from the upper one."""
+    mesh = blob(2)
+    c = confidence(mesh, np.full(mesh.n_vertices, level))
+    np.testing.assert_allclose(c, float(level > 0.95), atol=1e-9)
+
+
+def test_more_agreement_is_more_confidence() -> None:
+    """3. Monotone, and doubt stays near where it arises."""
+    mesh = icosphere(3)
+    agreed = np.full(mesh.n_vertices, 0.95)
+    agreed[mesh.vertices[:, 2] > 0.8] = 0.0
+    c = confidence(mesh, agreed)
+    assert (c >= 0).all()
+    assert (c <= 1).all()
+    assert c[mesh.vertices[:, 2] > 0.95].mean() < 0.3 * c[mesh.vertices[:, 2] < 0].mean()
+    assert (confidence(mesh, agreed + 0.02) >= c - 1e-12).all()
+
+
+def test_heads_are_known_cubes_are_not(shipped: Model) -> None:
+    """4. The head in examples/ against shapes that no training saw."""
+    head = api.load(ROOT / "examples" / "head.obj").mesh
+    known = predict_field(head, shipped)
+    assert mean(head, known) > 0.95
+    for mesh in (cube(8), torus(48, 24), blob(3)):
+        assert mean(mesh, predict_field(mesh, shipped, cache=False)) < 0.5
+
+
+def test_invariance(shipped: Model) -> None:
+    """5. Neither motion, scale nor labels matter."""
+    rng = np.random.default_rng(3)
+    head = api.load(ROOT / "examples" / "head.obj").mesh
+    mesh = make_proxy(head, 1500) or head
+    first = predict_field(mesh, shipped, cache=False).confidence
+    assert first is not None
+    assert first.max() > 0.05  # not all clipped away
+    rigid = random_rigid(rng)
+    away = TriMesh(3.0 * rigid.points(mesh.vertices), mesh.faces)
+    second = predict_field(away, shipped, cache=False).confidence
+    np.testing.assert_allclose(second, first, atol=1e-3)
+    other = relabel(mesh, rng)
+    third = predict_field(other.mesh, shipped, cache=False).confidence
+    assert third is not None
+    np.testing.assert_allclose(third[other.vertex], first, atol=1e-3)
+
+
+def test_limits_of_the_blend() -> None:
+    """6. Certain: the prediction, untouched. In doubt: the curvature's field, sizes evened."""
+    mesh = blob(3)
+    n = mesh.n_vertices
+    rng = np.random.default_rng(0)
+    z, size = np.exp(2j * np.pi * rng.random(n)), np.exp(rng.normal(size=n))
+    sure = CrossField("vertices", z, size, np.ones(n))
+    assert lean_on_curvature(mesh, sure) is sure
+    unsure = CrossField("vertices", z, size, np.zeros(n))
+    found = lean_on_curvature(mesh, unsure)
+    other = to_vertices(mesh, curvature_field(mesh))
+    np.testing.assert_allclose(found.z, other.z, atol=1e-9)
+    assert found.confidence is not None
+    assert found.size is not None
+    assert other.confidence is not None
+    np.testing.assert_allclose(found.confidence, other.confidence, atol=1e-9)
+    area = mesh.vertex_areas
+    middle = area @ np.log(size) / area.sum()
+    np.testing.assert_allclose(np.log(found.size) - middle, 0.5 * (np.log(size) - middle))
+
+
+def test_blend_between() -> None:
+    """7. By hand; what was not predicted stays unknown; components have their own mean size."""
+    mesh = merge(icosphere(0), moved(icosphere(0), (5.0, 0.0, 0.0)))
+    n = mesh.n_vertices
+    z = np.ones(n, dtype=complex)
+    z[0] = 0.0
+    size = np.where(np.arange(n) < 12, 1.0, 3.0)
+    half = np.full(n, 0.5)
+    found = blend(
+        mesh,
+        CrossField("vertices", z, size, half),
+        CrossField("vertices", np.full(n, 1j), None, half),
+    )
+    assert found.z[0] == 0
+    np.testing.assert_allclose(found.z[1:], (0.5 + 0.25j) / abs(0.5 + 0.25j))
+    assert found.confidence is not None
+    np.testing.assert_allclose(found.confidence[1:], abs(0.5 + 0.25j))
+    assert found.size is not None
+    np.testing.assert_allclose(found.size, size)
+
+
+def test_proxies_carry_confidence() -> None:
+    """8. Back from the proxy, still in [0, 1]."""
+    mesh = icosphere(3)
+    proxy = make_proxy(mesh, 300)
+    assert proxy is not None
+    c = (1.0 + proxy.vertices[:, 2] / np.abs(proxy.vertices[:, 2]).max()) / 2.0
+    back = carry_back(proxy, CrossField("vertices", np.ones(len(c)), None, c), mesh).confidence
+    assert back is not None
+    assert back.min() >= 0
+    assert back.max() <= 1
+    np.testing.assert_allclose(back, (1.0 + mesh.vertices[:, 2]) / 2.0, atol=0.08)
