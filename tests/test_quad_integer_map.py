@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.map_stages import NAMES, Stages, made, noisy, stages
-from tests.meshes import blob, icosphere
+from tests.meshes import blob, icosphere, pretzel
 from vhquad.errors import ParametrizationError
 from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.triangle import next_halfedge
@@ -116,18 +116,44 @@ def test_noisy_field(target: int, rng: np.random.Generator) -> None:
     assert extracted(m).n_quads == len(layout.quads)
 
 
-def test_the_careful_way_unfolds_what_stiffening_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
-    s = stages("pretzel")
-    layout = s.quantise(20).layout
-    assert build(s, layout).is_valid
-    # Without it some triangle stays folded, and is counted.
-    monkeypatch.setattr(
-        "vhquad.quad.integer_map._moved",
-        lambda energy, start, fixed, even, _: np.where(even, fixed, start),
-    )
-    left = build(s, layout)
-    assert left.flips > 0
-    assert not left.is_valid
+COARSE = ("bad_torus", "cone", "open_torus", "pretzel", "plate")
+
+
+def test_the_careful_way_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vhquad.quad.integer_map.SOLVES", 0)
+    for name in COARSE:
+        assert build(stages(name), stages(name).quantise(20).layout).is_valid
+
+
+def test_folds_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    # With ordinary vertices left where the continuous map has them, coarse maps fold.
+    monkeypatch.setattr("vhquad.quad.integer_map._moved", lambda task, _: task.start)
+    monkeypatch.setattr("vhquad.quad.integer_map.SOLVES", 0)
+    monkeypatch.setattr("vhquad.quad.integer_map.MOST_SPLITS", 0)
+    for name in COARSE:
+        left = build(stages(name), stages(name).quantise(20).layout)
+        assert left.flips > 0
+        assert not left.is_valid
+
+
+def test_splits_make_room_where_the_mesh_has_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    # One quad to two triangles, with dozens of singularities: some of these have no room.
+    mesh = pretzel(2)
+    cases = [
+        made(mesh, quads=233, z=noisy(mesh, 0.9, np.random.default_rng(seed)))
+        for seed in (5, 9, 21, 26, 29, 33, 35)
+    ]
+    cases = [s for s in cases if s.seamless.is_valid]
+    layouts = [s.quantise(233).layout for s in cases]
+    split = 0
+    for s, layout in zip(cases, layouts, strict=True):
+        m = build(s, layout)
+        assert m.is_valid
+        assert extracted(m).n_quads == len(layout.quads)
+        split += m.mesh.n_faces > s.aligned.mesh.n_faces
+    assert split > 0
+    monkeypatch.setattr("vhquad.quad.integer_map.MOST_SPLITS", 0)
+    assert not all(build(s, layout).is_valid for s, layout in zip(cases, layouts, strict=True))
 
 
 def test_lengths_that_contradict_each_other() -> None:

@@ -4,7 +4,7 @@ The arc lengths decide every unknown of the seamless space that moves an isoline
 (:mod:`vhquad.quad.integer_equations`). With those held, the ordinary vertices are solved for as in
 :mod:`vhquad.quad.seamless_map`; if triangles stay folded, the held values are instead moved from
 the continuous map, which has no folds, to the integers by Newton steps on an energy that lets no
-triangle fold (Smith & Schaefer 2015).
+triangle fold (Smith & Schaefer 2015). Where the mesh has no room for the map, edges are split.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,7 @@ from vhquad.quad.map_energy import MapEnergy, determinants, largest_step, solve_
 from vhquad.quad.motorcycle import Tracing
 from vhquad.quad.seamless import SeamlessSpace, seamless_space
 from vhquad.quad.seamless_map import SeamlessMap, _wrong_angles, rotate, twice_area
+from vhquad.quad.split_space import split_space
 from vhquad.quad.tmesh import TMesh
 
 __all__ = ["IntegerMap", "integer_map"]
@@ -39,7 +41,9 @@ CAP = 1e6
 REACH = 0.8  # of the way to the first fold that a careful step goes
 CENTRING = 1  # Newton steps of the free unknowns after each step towards the integers
 SHORTEST = 1e-4  # of a careful step; below, or where a triangle has lost almost all of its
-COLLAPSED = 1e-7  # area, a fold cannot be avoided
+COLLAPSED = 1e-6  # area, the mesh has no room for the map
+CROWDED = 1e-4  # relative area of the triangles that are split then
+MOST_SPLITS = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +53,7 @@ class IntegerMap:
     Attributes
     ----------
     mesh : TriMesh
-        The refined mesh of the aligned field.
+        The mesh of the aligned field, now and then with a few edges split.
     uv : (m, 3, 2) float64
         Coordinates of corner k of face f in the chart of f, in quad edges. Special vertices are
         integers, every feature edge lies on an integer isoline, and no other vertex does.
@@ -116,15 +120,11 @@ def integer_map(
     equations = map_equations(aligned, seamless, space, tracing, tmesh)
     anchors = np.rint(flat.reshape(-1)[equations.anchors]).astype(np.int64)
     fixed = solve_integers(equations, space, layout.lengths, anchors)
-
     basis = (space.basis / space.denominator).tocsr()
     transpose = basis.T.tocsr()
     start = solve_positive(transpose @ basis, np.asarray(transpose @ flat.reshape(-1)))
-    size = 1.0 if aligned.size is None else aligned.size
-    energy = MapEnergy(aligned.mesh, space.wedge, basis, scale / size * np.exp(1j * space.angle))
     best: IntegerMap | None = None
-    for unknowns in _attempts(energy, start, fixed, space.even, deadline):
-        made = _snapped(aligned, space, fixed, unknowns)
+    for made in _attempts(_Task(aligned, space, scale, start, fixed), deadline):
         if best is None or (made.flips, made.wrong_angles) < (best.flips, best.wrong_angles):
             best = made
         if best.is_valid:
@@ -133,42 +133,86 @@ def integer_map(
     return best
 
 
-def _attempts(
-    energy: MapEnergy, start: Floats, fixed: Ints, even: NDArray[np.bool_], deadline: float
-) -> Iterator[Floats]:
-    """Unknowns with the ``even`` ones fixed: by stiffening, then by the careful way."""
-    x = np.where(even, fixed, start)
-    free = np.flatnonzero(~even)
-    weight = np.ones(energy.mesh.n_faces)
-    least = energy.mesh.n_faces
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """A map without folds, ``start``, and where its ``even`` unknowns shall go, ``fixed``."""
+
+    aligned: AlignedField
+    space: SeamlessSpace
+    scale: float
+    start: Floats
+    fixed: Ints
+
+    @cached_property
+    def energy(self) -> MapEnergy:
+        """Distortion against the sizes and directions of the field."""
+        size = 1.0 if self.aligned.size is None else self.aligned.size
+        return MapEnergy(
+            self.aligned.mesh,
+            self.space.wedge,
+            (self.space.basis / self.space.denominator).tocsr(),
+            self.scale / size * np.exp(1j * self.space.angle),
+        )
+
+    @cached_property
+    def free(self) -> Ints:
+        """Unknowns that are not fixed."""
+        return np.flatnonzero(~self.space.even)
+
+    def at_goal(self, x: Floats) -> Floats:
+        """Unknowns with the fixed ones where they shall go."""
+        return np.where(self.space.even, self.fixed, x)
+
+    def split(self, faces: Ints) -> _Task:
+        """The same with more vertices in some faces."""
+        made = split_space(self.aligned, self.space, faces)
+        added = np.asarray(made.middle @ self.start)
+        return _Task(
+            made.aligned,
+            made.space,
+            self.scale,
+            np.append(self.start, added),
+            np.append(self.fixed, np.zeros(len(added), dtype=np.int64)),
+        )
+
+
+def _attempts(task: _Task, deadline: float) -> Iterator[IntegerMap]:
+    """Maps by stiffening, then by the careful way, with more vertices where it is stuck."""
+    x = task.at_goal(task.start)
+    weight = np.ones(task.aligned.mesh.n_faces)
+    least = task.aligned.mesh.n_faces
     for _ in range(SOLVES):
-        x = energy.least_squares(weight, x, free)
-        yield x
-        area = determinants(energy.frames(x))
-        folds = int((area <= 0).sum())
+        x = task.energy.least_squares(weight, x, task.free)
+        yield _snapped(task, x)
         if time.monotonic() > deadline:
             return
+        area = determinants(task.energy.frames(x))
+        folds = int((area <= 0).sum())
         if folds > least // 2:
             break
         least = folds
         weight = np.where(area < LEAST_DETERMINANT, np.minimum(STIFFER * weight, CAP), weight)
-    yield _moved(energy, start, fixed, even, deadline)
+    for _ in range(MOST_SPLITS + 1):
+        x = _moved(task, deadline)
+        yield _snapped(task, x)
+        if time.monotonic() > deadline:
+            return
+        stuck = np.flatnonzero(determinants(task.energy.frames(x)) < CROWDED)
+        task = task.split(stuck)
 
 
-def _moved(
-    energy: MapEnergy, start: Floats, fixed: Ints, even: NDArray[np.bool_], deadline: float
-) -> Floats:
-    """From a map without folds to the fixed values, without a fold on the way.
+def _moved(task: _Task, deadline: float) -> Floats:
+    """From a map without folds to the fixed values, or near them, without a fold on the way.
 
     Each step moves the fixed unknowns straight at their goal and the others as a Newton step of
     the energy asks, as far as no triangle loses most of its area; then the others are centred.
     """
-    x = start.copy()
-    free = np.flatnonzero(~even)
+    x, energy, free = task.start, task.energy, task.free
     operator = energy.restricted(free)
     transpose = operator.T.tocsr()
     while time.monotonic() < deadline:
-        rest = np.where(even, fixed - x, 0.0)
+        rest = task.at_goal(x) - x
+        rest[free] = 0.0
         for centring in range(CENTRING + 1):
             frames = energy.frames(x)
             slope, hessian = energy.derivatives(frames)
@@ -180,10 +224,11 @@ def _moved(
             move = energy.frames(step)
             length = min(1.0, REACH * largest_step(frames, move))
             if centring == 0:
-                hopeless = length < SHORTEST or determinants(frames).min() < COLLAPSED
-                x = x if hopeless else x + length * step
-                if hopeless or length == 1.0:
-                    return np.where(even, fixed, x)
+                if length < SHORTEST or determinants(frames).min() < COLLAPSED:
+                    return x
+                x = x + length * step
+                if length == 1.0:
+                    return task.at_goal(x)
                 continue
             before, along = energy.value(frames), float(slope @ move.ravel())
             while energy.value(frames + length * move) > before + 1e-4 * length * along:
@@ -191,14 +236,14 @@ def _moved(
                 if length < SHORTEST:
                     break
             x = x + length * step
-    return np.where(even, fixed, x)
+    return x
 
 
-def _snapped(aligned: AlignedField, space: SeamlessSpace, fixed: Ints, x: Floats) -> IntegerMap:
+def _snapped(task: _Task, x: Floats) -> IntegerMap:
     """Exact coordinates: fixed unknowns whole, the others odd multiples of 1 / GRID."""
-    mesh = aligned.mesh
+    space, mesh = task.space, task.aligned.mesh
     odd = 2 * np.floor(x * (GRID / 2)).astype(np.int64) + 1
-    flat = space.basis @ np.where(space.even, fixed * GRID, odd)
+    flat = space.basis @ np.where(space.even, task.fixed * GRID, odd)
     if (flat % space.denominator).any():
         raise AssertionError("a vertex of the integer-grid map is off the lattice")
     uv = (flat // space.denominator).reshape(-1, 2)[space.wedge]
@@ -212,7 +257,7 @@ def _snapped(aligned: AlignedField, space: SeamlessSpace, fixed: Ints, x: Floats
         mesh=mesh,
         uv=uv / GRID,
         flips=int((twice_area(uv) <= 0).sum()),
-        wrong_angles=_wrong_angles(aligned, uv),
+        wrong_angles=_wrong_angles(task.aligned, uv),
         rotation=space.rotation,
         translation=translation // GRID,
     )
