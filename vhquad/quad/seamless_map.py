@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, diags
-from scipy.sparse.linalg import splu
 
 from vhquad.field.align import AlignedField
 from vhquad.mesh.triangle import TriMesh, next_halfedge
+from vhquad.quad.map_energy import solve_positive
 from vhquad.quad.seamless import SeamlessSpace, seamless_space
 
 __all__ = ["SeamlessMap", "solve_seamless_map"]
@@ -193,14 +193,7 @@ class _Problem:
         # Charts may drift together where nothing ties them down: hold them softly. The wanted
         # gradients do not care, so a weak pull on all unknowns changes nothing visible.
         matrix = matrix + diags(np.full(matrix.shape[0], 1e-9 * matrix.diagonal().mean()))
-        return np.asarray(
-            splu(
-                matrix.tocsc(),
-                permc_spec="MMD_AT_PLUS_A",
-                diag_pivot_thresh=0.0,
-                options={"SymmetricMode": True},
-            ).solve(np.asarray(self.transpose @ right))
-        )
+        return solve_positive(matrix.tocsr(), np.asarray(self.transpose @ right))
 
     def corners(self, unknowns: Floats) -> NDArray[np.complex128]:
         """Chart coordinates of the corners; (m, 3) complex."""
