@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from tests.meshes import grid
@@ -22,7 +24,7 @@ def _vertex(mesh: TriMesh, x: float, y: float) -> int:
 
 def _path(mesh: TriMesh, *places: tuple[float, float]) -> list[tuple[int, int]]:
     v = [_vertex(mesh, x, y) for x, y in places]
-    return list(zip(v[:-1], v[1:], strict=True))
+    return list(itertools.pairwise(v))
 
 
 def test_branch_of_a_long_crease_goes() -> None:

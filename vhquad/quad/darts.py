@@ -128,7 +128,8 @@ class Darts:
         while True:
             # An edit may free another one far away: go over all places again until nothing moves.
             later = [d for d in dict.fromkeys(seen) if self.alive[d]]
-            seen, work, edits = list(later), [], 0
+            work: list[int] = []
+            seen, edits = list(later), 0
             while work or later:
                 d = work.pop() if work else later.pop()
                 if not self.alive[d]:
@@ -223,10 +224,9 @@ def face_orbits(turn: Ints, across: Ints, alive: Bools) -> tuple[Ints, Ints]:
     low, jump = np.arange(len(turn)), after.copy()
     while darts.size:
         fresh = np.minimum(low[darts], low[jump[darts]])
-        step = jump[jump[darts]]
         if np.array_equal(fresh, low[darts]):
             break
-        low[darts], jump[darts] = fresh, step
+        low[darts], jump[darts] = fresh, jump[jump[darts]]
     first = darts[low[darts] == darts]
     rank = np.zeros(len(turn), dtype=np.int64)
     walk, home, step = after[first], first, 0
@@ -237,5 +237,7 @@ def face_orbits(turn: Ints, across: Ints, alive: Bools) -> tuple[Ints, Ints]:
         rank[walk] = step
         walk = after[walk]
     order = darts[np.lexsort((rank[darts], low[darts]))]
-    opens = np.flatnonzero(np.append(True, low[order][1:] != low[order][:-1])) if len(order) else []
+    if len(order) == 0:
+        return order, np.zeros(1, dtype=np.int64)
+    opens = np.flatnonzero(np.append(True, low[order][1:] != low[order][:-1]))
     return order, np.append(opens, len(order)).astype(np.int64)
