@@ -11,12 +11,15 @@ from numpy.typing import NDArray
 from vhquad.errors import ParametrizationError
 from vhquad.field.cross import CrossField
 from vhquad.field.mirrored import to_half, with_mirror_image
+from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.mirror import Half, cut_half, mirror_faces
 from vhquad.mesh.plane import MirrorPlane
 from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.symmetry import Symmetry, find_symmetry
 from vhquad.mesh.triangle import TriMesh
 from vhquad.quad.parts import Part, join_quads
+from vhquad.quad.smooth import smooth_quads
+from vhquad.quad.strips import split_strips
 from vhquad.report import MeshCounts, SymmetryReport
 
 __all__ = ["SYMMETRIES", "Mirrored", "find_plane", "remesh_mirrored"]
@@ -126,16 +129,22 @@ def remesh_mirrored(
     own = replace(own, size=_sizes(own) * np.sqrt(count / wanted))
     pairs = None if creases is None else half.carry_edges(creases)
     parts = remesh_parts(half.mesh, own, pairs, half.seam)
-    on = [_on_plane(p.quads, half) & cut for p, cut in zip(parts, half.is_cut, strict=True)]
-    quads = join_quads([part.quads for part in parts])
+    made, on = [], []
+    for number, (part, cut) in enumerate(zip(parts, half.is_cut, strict=True)):
+        quads = part.quads
+        if cut:
+            quads = _apart(quads, half, number)
+        made.append(quads)
+        on.append(_on_plane(quads, half) & cut)
+    quads = join_quads(made)
     quads = QuadMesh(*mirror_faces(quads.vertices, quads.quads, np.concatenate(on), plane))
-    made = MeshCounts.of(quads).topology
-    if not quads.is_manifold or made != half.topology:
+    topology = MeshCounts.of(quads).topology
+    if not quads.is_manifold or topology != half.topology:
         raise ParametrizationError(
             "the mirrored quads are not manifold"
             if not quads.is_manifold
             else "the mirrored quads have (components, Euler characteristic, boundary loops) "
-            f"{made} instead of {half.topology}"
+            f"{topology} instead of {half.topology}"
         )
     return Mirrored(quads, parts, half.doubled)
 
@@ -148,3 +157,38 @@ def _on_plane(quads: QuadMesh, half: Half) -> Bools:
     """Boundary vertices on the plane: the pipeline keeps to the boundary up to rounding; (n,)."""
     height = np.abs(half.plane.height(quads.vertices))
     return quads.is_boundary_vertex & (height <= _ON * half.mesh.diagonal)
+
+
+def _apart(quads: QuadMesh, half: Half, number: int) -> QuadMesh:
+    """No inner edge from seam to seam, which would coincide with its image.
+
+    Where one quad spans a thin part from one side of the seam to the other, the strip of quads
+    across it is split.
+    """
+    on = _on_plane(quads, half)
+    across = np.flatnonzero(on[quads.edges].all(axis=1) & (quads.edge_quads == 2))
+    if not across.size:
+        return quads
+    surface, _ = half.mesh.submesh(half.mesh.face_component == number)
+    split = split_strips(quads, across)
+    mesh, n = split.mesh, quads.n_vertices
+    vertices = np.array(mesh.vertices)
+    # The middle of such an edge is inside the thin part: its place is on the outer side.
+    length = np.linalg.norm(np.diff(quads.vertices[quads.edges], axis=1)[:, 0], axis=1)
+    middle = np.flatnonzero(np.isin(split.edge, across))
+    outward = np.sign(half.plane.height(surface.vertices).sum()) * half.plane.normal
+    vertices[n + middle] += length[split.edge[middle], None] * outward
+    new = np.arange(mesh.n_vertices) >= n
+    border = new & mesh.is_boundary_vertex
+    whole = ClosestPoints(surface)
+    vertices[border] = _boundary(surface).query(vertices[border]).point
+    vertices[new & ~border] = whole.query(vertices[new & ~border]).point
+    fixed = mesh.is_boundary_vertex
+    return QuadMesh(smooth_quads(vertices, mesh.quads, whole, fixed), mesh.quads)
+
+
+def _boundary(mesh: TriMesh) -> ClosestPoints:
+    """Queries on the boundary of a mesh, as triangles without area."""
+    rim = np.flatnonzero(mesh.twin < 0)
+    tail, head = mesh.tail[rim], mesh.head[rim]
+    return ClosestPoints(TriMesh(mesh.vertices, np.stack([tail, head, head], axis=1)))
