@@ -106,20 +106,43 @@ def _epsilon(area: Floats) -> float:
     return 1e-3 if least > 0.02 else min(0.3, max(1e-3, 0.16 * np.sqrt(max(-least, 0.0))))
 
 
-def descend(problem: Problem, state: State, factor: SuperLU, iterations: int) -> State:
-    """Minimise the barrier energy; the best state met (`better`), the given one included."""
-    best = state
+def descend(
+    problem: Problem, state: State, factor: SuperLU, iterations: int, patience: int = 0
+) -> State:
+    """Minimise the barrier energy.
+
+    Parameters
+    ----------
+    problem, state
+        What to solve, and where to start.
+    factor : SuperLU
+        Of :func:`laplacian_factor`.
+    iterations : int
+        Steps. After them it goes on while quads are folded, as long as ``patience`` steps have
+        not passed without one less.
+    patience : int
+
+    Returns
+    -------
+    State
+        The best state met (see `better`), the given one included.
+    """
+    best, best_at, number = state, 0, 0
     history: list[tuple[Floats, Floats]] = []
-    gradient, moved = np.zeros((0, 3)), np.zeros((0, 3))
-    for _ in range(iterations):
+    gradient, moved, last_epsilon = np.zeros((0, 3)), np.zeros((0, 3)), 0.0
+    while number < iterations or (best.folded.any() and number < best_at + patience):
+        number += 1
         args = (problem.quads, state.quad_normals, problem.size)
         epsilon = _epsilon(distortion(state.vertices, *args, 1.0, SIZE_WEIGHT, False).area)
         now = distortion(state.vertices, *args, epsilon, SIZE_WEIGHT)
         last, gradient = gradient, tangential(problem, state, now.gradient)
-        if len(last):
+        if not 1 / 1.5 < epsilon / max(last_epsilon, 1e-300) < 1.5:
+            history = []  # of another energy
+        elif len(last):
             step, change = tangential(problem, state, moved), gradient - last
             if (step * change).sum() > 1e-8 * np.linalg.norm(step) * np.linalg.norm(change):
                 history = [*history, (step, change)][-MEMORY:]
+        last_epsilon = epsilon
         move = -tangential(problem, state, _two_loop(problem, gradient, history, factor))
         slope = float((move * gradient).sum())
         if slope >= 0:
@@ -139,6 +162,8 @@ def descend(problem: Problem, state: State, factor: SuperLU, iterations: int) ->
         following = place(problem, state.vertices + scale * move, state)
         moved, state = following.vertices - state.vertices, following
         if better(state, best):
+            if state.folded.sum() < best.folded.sum():
+                best_at = number
             best = state
         if scale * length < 1e-7:
             break

@@ -28,7 +28,9 @@ SPREAD_ITERATIONS = 10
 POOR = 0.1  # a quad with a scaled Jacobian below this gets a patch problem of its own
 PATCH_RINGS = 4
 PATCH_ITERATIONS = 40
-PATCH_ROUNDS = 3
+PATCH_ROUNDS = 4
+PATIENCE = 60
+LOOSE_ROUNDS = 3
 
 
 def smooth_quads(
@@ -39,6 +41,7 @@ def smooth_quads(
     curves: CurveConstraints | None = None,
     iterations: int = 30,
     target_edge: ArrayLike | None = None,
+    loosen: bool = False,
 ) -> Floats:
     """Move the vertices of a quad mesh over its surface until quads are unfolded and square.
 
@@ -59,6 +62,9 @@ def smooth_quads(
     target_edge : (n,) array_like, optional
         Wanted edge length near each vertex. Default: the given distribution, smoothed. Only
         ratios count, since the sizes are scaled to fill the surface.
+    loosen : bool
+        Let the inner fixed and bound vertices of quads that stay folded go from their places and
+        curves (creases), on the surface; those on the boundary of the quads never.
 
     Returns
     -------
@@ -92,24 +98,21 @@ def smooth_quads(
     start = place(problem, x, None)
     if hold.all() or iterations <= 0:
         return start.vertices
-    state = _polish(problem, start, SPREAD_ITERATIONS, iterations)
-    if state.folded.any():
-        # Spreading may drag quads out of thin parts; the barrier alone is slower but stays.
-        other = _polish(problem, start, 0, 2 * iterations)
-        state = other if better(other, state) else state
-    return state.vertices
-
-
-def _polish(problem: Problem, start: State, spreading: int, iterations: int) -> State:
     factor = laplacian_factor(problem)
-    state = spread(problem, start, factor, spreading)
-    state = descend(problem, state, factor, iterations)
-    for _ in range(PATCH_ROUNDS):
-        poor = _poor_quads(problem, state)
-        if not poor.any():
+    state = spread(problem, start, factor, SPREAD_ITERATIONS)
+    state = _mended(problem, descend(problem, state, factor, iterations), POOR)
+    if state.folded.any():
+        # Spreading may drag quads out of thin parts; unfolding first is slower but stays.
+        other = descend(problem, _mended(problem, start, 0.0), factor, iterations, PATIENCE)
+        other = _mended(problem, other, POOR)
+        state = other if better(other, state) else state
+    state = start if better(start, state) else state
+    for _ in range(LOOSE_ROUNDS if loosen else 0):
+        if not state.folded.any():
             break
-        state = _repair_patches(problem, state, poor)
-    return start if better(start, state) else state
+        problem = _loosened(problem, state)
+        state = _mended(problem, state, POOR)
+    return state.vertices
 
 
 def smoothed_sizes(vertices: Floats, quads: Ints, area: float, rounds: int = 8) -> Floats:
@@ -128,9 +131,32 @@ def smoothed_sizes(vertices: Floats, quads: Ints, area: float, rounds: int = 8) 
     return np.asarray(np.sqrt(value * (area / value.sum())))
 
 
-def _poor_quads(problem: Problem, state: State) -> Bools:
-    jacobians = corner_jacobians(state.vertices, problem.quads, state.quad_normals)
-    return np.asarray(state.folded | (jacobians.min(axis=1) < POOR))
+def _loosened(problem: Problem, state: State) -> Problem:
+    """The problem without the constraints of the folded quads' vertices, boundary ones apart."""
+    tail, head = problem.quads, np.roll(problem.quads, -1, axis=1)
+    key = np.minimum(tail, head) * np.int64(len(problem.fixed)) + np.maximum(tail, head)
+    _, edge, count = np.unique(key, return_inverse=True, return_counts=True)
+    rim = (count[edge] == 1).reshape(key.shape)
+    let_go = np.zeros(len(problem.fixed), dtype=bool)
+    let_go[problem.quads[state.folded]] = True
+    let_go[tail[rim]] = let_go[head[rim]] = False
+    curves = problem.curves.bind(np.where(let_go, -1, problem.curves.curve))
+    return make_problem(
+        problem.quads, problem.surface, curves, problem.fixed & ~let_go, problem.size
+    )
+
+
+def _mended(problem: Problem, state: State, least: float) -> State:
+    """Solve patches around folded quads and those with scaled Jacobians below ``least``."""
+    for _ in range(PATCH_ROUNDS):
+        jacobians = corner_jacobians(state.vertices, problem.quads, state.quad_normals)
+        poor = state.folded | (jacobians.min(axis=1) < least)
+        if not poor.any():
+            break
+        before, state = state, _repair_patches(problem, state, poor)
+        if not better(state, before):
+            break
+    return state
 
 
 def _repair_patches(problem: Problem, state: State, poor: Bools) -> State:
@@ -154,7 +180,7 @@ def _repair_patches(problem: Problem, state: State, poor: Bools) -> State:
     if part.fixed.all():
         return state
     start = place(part, state.vertices[used], None)
-    solved = descend(part, start, laplacian_factor(part), PATCH_ITERATIONS)
+    solved = descend(part, start, laplacian_factor(part), PATCH_ITERATIONS, PATIENCE)
     merged = [np.array(old) for old in (state.vertices, state.arc, state.normals)]
     for whole, new in zip(merged, (solved.vertices, solved.arc, solved.normals), strict=True):
         whole[used] = new
