@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -53,17 +55,30 @@ def invoke_with(capsys: pytest.CaptureFixture[str]) -> Invoke:
     return invoke
 
 
-def program(*arguments: str | Path, cwd: Path | None = None) -> subprocess.Popen[str]:
-    """`python -m vhquad ...` as a program of its own."""
+@contextmanager
+def program(*arguments: str | Path, cwd: Path | None = None) -> Iterator[subprocess.Popen[str]]:
+    """`python -m vhquad ...` as a program of its own that heeds Ctrl-C; killed in the end.
+
+    What was started in the background ignores Ctrl-C, and so would its children.
+    """
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
-    return subprocess.Popen(
-        [sys.executable, "-m", "vhquad", *map(str, arguments)],
+    start = (
+        "import runpy, signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+        "runpy.run_module('vhquad', run_name='__main__', alter_sys=True)"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", start, *map(str, arguments)],
         cwd=cwd,
         env=environment,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
     )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
 
 
 def write_obj(path: Path, vertices: ArrayLike, faces: ArrayLike) -> Path:

@@ -33,8 +33,8 @@ def test_help_starts_at_once() -> None:
     """Processor time, because the wall time depends on what else runs; CI measures that."""
     resource = pytest.importorskip("resource")
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    process = program("--help")
-    process.communicate(timeout=30)
+    with program("--help") as process:
+        process.communicate(timeout=30)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     assert process.returncode == 0
     assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 0.4
@@ -123,12 +123,13 @@ def test_a_signal_leaves_nothing(tmp_path: Path, number: signal.Signals) -> None
     mesh = blob(6)
     pipe = tmp_path / "blob.obj"
     os.mkfifo(pipe)
-    process = program("remesh", pipe, "--method", "curvature", "--out", tmp_path / "q.obj")
-    write_obj(pipe, mesh.vertices, mesh.faces)
-    time.sleep(1.0)
-    assert process.poll() is None, "the remesh was over before the signal"
-    process.send_signal(number)
-    out, err = process.communicate(timeout=60)
+    options = ("--method", "curvature", "--out", tmp_path / "q.obj")
+    with program("remesh", pipe, *options) as process:
+        write_obj(pipe, mesh.vertices, mesh.faces)
+        time.sleep(1.0)
+        assert process.poll() is None, "the remesh was over before the signal"
+        process.send_signal(number)
+        out, err = process.communicate(timeout=60)
     assert process.returncode == 128 + number
     assert "Traceback" not in err
     assert out == ""

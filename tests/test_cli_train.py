@@ -69,13 +69,13 @@ def test_refusals(invoke: Invoke, tmp_path: Path) -> None:
 
 def test_interrupted_preprocess_stops_its_workers(folder: Path) -> None:
     """Ctrl-C reaches the whole group; nothing half written stays, no worker goes on."""
-    process = program("preprocess", folder, "--triangulations", "500", "--jobs", "2")
-    while not (folder.parent / "quads_dataset" / "samples").exists():
-        assert process.poll() is None
-        time.sleep(0.1)
-    time.sleep(3.0)  # workers have started, or are about to
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)  # ends when the last worker has closed the pipes
+    with program("preprocess", folder, "--triangulations", "500", "--jobs", "2") as process:
+        while not (folder.parent / "quads_dataset" / "samples").exists():
+            assert process.poll() is None
+            time.sleep(0.1)
+        time.sleep(3.0)  # workers have started, or are about to
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)  # ends when the last worker has closed the pipes
     assert (process.returncode, out) == (130, "")
     assert err.splitlines()[-1] == "vhquad: interrupted"
     assert "Traceback" not in err
