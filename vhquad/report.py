@@ -282,6 +282,7 @@ def quality_shortfalls(quality: QualityReport) -> list[str]:
         "vertices that no quad uses": quality.unused_vertices,
         "folded quads (a scaled Jacobian of 0 or less)": quality.folded_quads,
         "quads that face against the surface": quality.flipped_quads,
+        "pairs of quads that cut through each other": quality.self_intersections,
     }
     return [f"{count} {text}" for text, count in counts.items() if count]
 

@@ -152,6 +152,7 @@ def _quality_rows(table: Table, quality: QualityReport, surface: MeshCounts | No
         f"{quality.scaled_jacobian_min:.3f} / {quality.scaled_jacobian_mean:.3f}",
     )
     table.add_row("folded quads", f"{quality.folded_quads}")
+    table.add_row("self-intersections", f"{quality.self_intersections}")
     if quality.flipped_quads is not None:
         table.add_row("quads facing the wrong way", f"{quality.flipped_quads}")
     if quality.distance is not None:

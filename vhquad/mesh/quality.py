@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.distance import Distance, surface_distance
+from vhquad.mesh.intersections import self_intersections
 from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.triangle import TriMesh
 
@@ -58,6 +59,8 @@ class QualityReport:
     edge_length_min: float
     edge_length_mean: float
     edge_length_max: float
+    self_intersections: int = 0
+    """Pairs of quads without a common vertex that cut through each other."""
     flipped_quads: int | None = None
     """Quads that face against the surface beneath them; None without a surface."""
     distance: Distance | None = None
@@ -131,6 +134,7 @@ def check_quads(mesh: QuadMesh, against: TriMesh | None = None) -> QualityReport
         edge_length_min=float(length.min()),
         edge_length_mean=float(length.mean()),
         edge_length_max=float(length.max()),
+        self_intersections=len(self_intersections(mesh)),
         flipped_quads=flipped,
         distance=distance,
     )
