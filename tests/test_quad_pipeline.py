@@ -36,6 +36,8 @@ from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.quality import scaled_jacobians
 from vhquad.mesh.triangle import TriMesh
 from vhquad.quad.pipeline import MAP, RemeshResult, RemeshSettings, remesh_mesh
+from vhquad.quad.quantize import Quantisation, quantise
+from vhquad.quad.tmesh import TMesh
 
 
 def plain_field(mesh: TriMesh) -> CrossField:
@@ -297,6 +299,21 @@ def test_a_field_without_a_map_falls_back(monkeypatch: pytest.MonkeyPatch) -> No
         assert part.method == "paired triangles"
         assert "3 triangles of the map stay folded after 9 solves" in part.reason
     assert any("paired triangles" in line for line in result.report.shortfalls())
+
+
+def test_a_layout_of_another_topology_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    from vhquad.quad import pipeline
+
+    def with_a_hole(tmesh: TMesh, target: float, area: float) -> Quantisation:
+        made = quantise(tmesh, target, area)
+        return replace(made, layout=replace(made.layout, quads=made.layout.quads[1:]))
+
+    monkeypatch.setattr(pipeline, "quantise", with_a_hole)
+    result = run(icosphere(2), 100)
+    check_valid(icosphere(2), result)
+    part = result.report.components[0]
+    assert part.method == "paired triangles"
+    assert "instead of (1, 2, 0)" in part.reason
 
 
 def test_what_does_not_fit_is_refused() -> None:

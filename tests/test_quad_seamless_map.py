@@ -112,6 +112,17 @@ def test_a_fold_is_counted() -> None:
     assert not m.is_valid
 
 
+def test_a_wrong_angle_is_counted() -> None:
+    # The field now asks for seven quads around a vertex where the map turns by three.
+    s = stages("sphere")
+    v = np.flatnonzero(s.aligned.sector_quads == 3)[0]
+    quads = s.aligned.sector_quads.copy()
+    quads[v] = 7
+    m = solve_seamless_map(replace(s.aligned, sector_quads=quads))
+    assert (m.flips, m.wrong_angles) == (0, 1)
+    assert not m.is_valid
+
+
 def test_quarter_turns() -> None:
     z = np.array([[3, 1]] * 5)
     turned = rotate(z, np.array([0, 1, 2, 3, -1]))
