@@ -30,6 +30,8 @@ Ints = NDArray[np.int64]
 COLOURS = {2: "#9b30b0", 3: "#d7301f", 5: "#2166ac", 6: "#08a8a0"}
 """Colour of a vertex by its quads; 2 stands for fewer too, 6 for more."""
 
+INDICES = {2: "index +1/2", 3: "index +1/4", 5: "index -1/4", 6: "index -1/2"}
+VALENCES = {2: "valence 2", 3: "valence 3", 5: "valence 5", 6: "valence 6+"}
 PANEL = (760, 860)  # pixels
 SURFACE, CROSS, EDGE = "#dcdcd6", "#3c3c3c", "#303030"
 CROSSES = 2500  # drawn, about
@@ -116,7 +118,7 @@ def _field_panel(plotter: Any, pv: Any, mesh: TriMesh, field: CrossField, view: 
     lines = pv.PolyData(np.concatenate([start, end]), lines=ends)
     plotter.add_mesh(lines, color=CROSS, line_width=1.6, lighting=False)
     points = mesh.vertices[singular.vertex]
-    _marks(plotter, pv, points, 4 - singular.quarters, mesh.diagonal, "index +1/4", "index -1/4")
+    _marks(plotter, pv, points, 4 - singular.quarters, mesh.diagonal, INDICES)
 
 
 def _quad_panel(plotter: Any, pv: Any, quads: QuadMesh, view: _View, diagonal: float) -> None:
@@ -127,7 +129,7 @@ def _quad_panel(plotter: Any, pv: Any, quads: QuadMesh, view: _View, diagonal: f
     if quads.n_quads:
         _surface(plotter, pv.PolyData.from_regular_faces(quads.vertices, quads.quads), 1.2)
     points, valence = quads.vertices[irregular], quads.valence[irregular]
-    _marks(plotter, pv, points, valence, diagonal, "valence 3", "valence 5")
+    _marks(plotter, pv, points, valence, diagonal, VALENCES)
 
 
 def _surface(plotter: Any, surface: Any, width: float) -> None:
@@ -143,10 +145,9 @@ def _surface(plotter: Any, surface: Any, width: float) -> None:
 
 
 def _marks(
-    plotter: Any, pv: Any, points: Floats, quads: Ints, diagonal: float, three: str, five: str
+    plotter: Any, pv: Any, points: Floats, quads: Ints, diagonal: float, names: dict[int, str]
 ) -> None:
     """Balls at singular or irregular vertices, coloured by their quads, and a legend."""
-    names = {2: "fewer", 3: three, 5: five, 6: "more"}
     kind = np.clip(quads, 2, 6)
     legend = []
     for value, colour in COLOURS.items():
@@ -162,7 +163,7 @@ def _marks(
             legend,
             face="circle",
             bcolor=None,
-            size=(0.28, 0.035 * len(legend)),
+            size=(0.34, 0.035 * len(legend)),
             loc="lower left",
             font_family="arial",
         )
