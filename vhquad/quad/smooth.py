@@ -203,10 +203,9 @@ def _solve_patch(problem: Problem, state: State, inside: Bools) -> State:
     )
     if part.fixed.all():
         return state
-    names = ("vertices", "arc", "normals", "facets")
-    start = measure(part, *(getattr(state, name)[used] for name in names))
+    start = measure(part, state.vertices[used], state.arc[used], state.normals[used])
     solved = descend(part, start, laplacian_factor(part), PATCH_ITERATIONS, PATIENCE)
-    merged = [np.array(getattr(state, name)) for name in names]
-    for whole, name in zip(merged, names, strict=True):
-        whole[used] = getattr(solved, name)
+    merged = [np.array(old) for old in (state.vertices, state.arc, state.normals)]
+    for whole, new in zip(merged, (solved.vertices, solved.arc, solved.normals), strict=True):
+        whole[used] = new
     return measure(problem, *merged)
