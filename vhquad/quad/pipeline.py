@@ -20,7 +20,6 @@ from numpy.typing import ArrayLike, NDArray
 from vhquad.errors import ConfigError, FieldError, ParametrizationError
 from vhquad.field.align import AlignedField, AlignSettings, align_field
 from vhquad.field.cross import CrossField
-from vhquad.field.density import bend_to_density
 from vhquad.field.features import find_creases
 from vhquad.field.prune import prune_branches
 from vhquad.field.transport import to_faces
@@ -190,18 +189,15 @@ def remesh_mesh(
         field = to_faces(mesh, field)
     if len(field) != mesh.n_faces:
         raise FieldError(f"the field has {len(field)} crosses, the mesh {mesh.n_faces} faces")
-    factor = None if density is None else checked_density(density, mesh.n_vertices)
     size, asked = wanted_sizes(
         mesh,
         field,
         adaptivity=settings.adaptivity,
-        density=factor,
+        density=None if density is None else checked_density(density, mesh.n_vertices),
         target_quads=settings.target_quads,
         edge_length=settings.edge_length,
     )
     field = replace(field, size=size)
-    if factor is not None:
-        field = bend_to_density(mesh, field, factor, float(np.sqrt(mesh.area / asked)))
     given = None if creases is None else np.asarray(creases, dtype=np.int64).reshape(-1, 2)
     result, parts, symmetry = _remesh(mesh, field, given, settings, with_uv, watch, progress)
     with watch("check"):
