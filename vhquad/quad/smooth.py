@@ -10,8 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from vhquad.errors import MeshError
 from vhquad.mesh.closest import ClosestPoints
@@ -113,7 +111,7 @@ def smooth_quads(
         if not state.folded.any():
             break
         problem = _loosened(problem, state)
-        state = _mended(problem, state, 0.0)
+        state = _mended(problem, state, POOR)
     return state.vertices
 
 
@@ -149,47 +147,25 @@ def _loosened(problem: Problem, state: State) -> Problem:
 
 
 def _mended(problem: Problem, state: State, least: float) -> State:
-    """Solve patches around folded quads; without any, around those with Jacobians below least."""
+    """Solve patches around folded quads and those with scaled Jacobians below ``least``."""
     for _ in range(PATCH_ROUNDS):
-        before = state
-        if state.folded.any():
-            inside = _rings(problem, state.folded)
-            for patch in _components(problem, inside):  # few, if any
-                state = _solve_patch(problem, state, patch)
-        else:
-            jacobians = corner_jacobians(state.vertices, problem.quads, state.quad_normals)
-            poor = jacobians.min(axis=1) < least
-            if poor.any():
-                state = _solve_patch(problem, state, _rings(problem, poor))
+        jacobians = corner_jacobians(state.vertices, problem.quads, state.quad_normals)
+        poor = state.folded | (jacobians.min(axis=1) < least)
+        if not poor.any():
+            break
+        before, state = state, _repair_patches(problem, state, poor)
         if not better(state, before):
             break
     return state
 
 
-def _rings(problem: Problem, core: Bools) -> Bools:
-    """Quads within some rings of a core."""
+def _repair_patches(problem: Problem, state: State, poor: Bools) -> State:
+    """Minimise again over the rings around poor quads only, the rest held."""
+    inside = poor
     for _ in range(PATCH_RINGS):
         touched = np.zeros(len(problem.fixed), dtype=bool)
-        touched[problem.quads[core]] = True
-        core = np.asarray(touched[problem.quads].any(axis=1))
-    return core
-
-
-def _components(problem: Problem, inside: Bools) -> list[Bools]:
-    """Some quads in parts that share no vertex."""
-    quads = problem.quads[inside]
-    rows = np.repeat(np.arange(len(quads)), 4)
-    touching = coo_matrix(
-        (np.ones(len(rows), dtype=np.int32), (rows, quads.reshape(-1))),
-        shape=(len(quads), len(problem.fixed)),
-    ).tocsr()
-    number, label = connected_components(touching @ touching.T, directed=False)
-    where = np.flatnonzero(inside)
-    return [np.isin(np.arange(len(inside)), where[label == i]) for i in range(number)]
-
-
-def _solve_patch(problem: Problem, state: State, inside: Bools) -> State:
-    """Minimise again over some quads only, their outer vertices held."""
+        touched[problem.quads[inside]] = True
+        inside = np.asarray(touched[problem.quads].any(axis=1))
     held = np.ones(len(problem.fixed), dtype=bool)
     held[problem.quads[inside]] = False
     held[problem.quads[~inside]] = True
@@ -203,7 +179,7 @@ def _solve_patch(problem: Problem, state: State, inside: Bools) -> State:
     )
     if part.fixed.all():
         return state
-    start = measure(part, state.vertices[used], state.arc[used], state.normals[used])
+    start = place(part, state.vertices[used], None)
     solved = descend(part, start, laplacian_factor(part), PATCH_ITERATIONS, PATIENCE)
     merged = [np.array(old) for old in (state.vertices, state.arc, state.normals)]
     for whole, new in zip(merged, (solved.vertices, solved.arc, solved.normals), strict=True):
