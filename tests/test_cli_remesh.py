@@ -132,6 +132,19 @@ def test_density_by_colour(invoke: Invoke, tmp_path: Path) -> None:
     assert invoke("remesh", path, "--density", "weight").refused("'weight'", "color")
 
 
+def test_density_must_be_positive(invoke: Invoke, tmp_path: Path) -> None:
+    """Said before any work, with the number of bad values and the first of them."""
+    rows = "0 0 0 1\n1 0 0 0\n0 1 0 nan\n3 0 1 2\n"
+    head = "ply\nformat ascii 1.0\nelement vertex 3\n"
+    head += "".join(f"property float {c}\n" for c in ("x", "y", "z", "w"))
+    head += "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    path = tmp_path / "a.ply"
+    path.write_text(head + rows, encoding="ascii")
+    run = invoke("remesh", path, *FAST, "--density", "w")
+    assert run.refused("--density w", "2 values", "0 at vertex 1")
+    assert [p.name for p in tmp_path.iterdir() if p.suffix == ".obj"] == []
+
+
 def test_map_for_libqex(invoke: Invoke, ring: Path) -> None:
     """As many cells of the integer grid as there are quads."""
     uv = ring.with_name("uv.obj")

@@ -94,8 +94,8 @@ def remesh(
         typer.Option(
             "--density",
             metavar="NAME",
-            help="A factor on the quads per area from the mesh's file: a vertex property of a PLY "
-            "by its name, or `color` (white 4, mid-grey 1, black 1/4).",
+            help="A positive factor on the quads per area from the mesh's file: a vertex property "
+            "of a PLY by its name, or `color` (white 4, mid-grey 1, black 1/4).",
             show_default=False,
         ),
     ] = None,
@@ -103,8 +103,8 @@ def remesh(
         Symmetry,
         typer.Option(
             "--symmetry",
-            help="Quads that are their own mirror image, in the best plane across an axis, or "
-            "(auto) in the best plane of all if the mesh has one.",
+            help="Quads that are exactly their own mirror image, with an edge loop on the plane: "
+            "the best one across an axis, or (auto) the best of all, if the mesh is symmetric.",
         ),
     ] = Symmetry.off,
     crease: Annotated[
@@ -192,6 +192,7 @@ def remesh(
         from vhquad.mesh.io import write_quad_mesh
         from vhquad.mesh.scalars import read_density
         from vhquad.quad.pipeline import RemeshSettings
+        from vhquad.quad.sizing import checked_density
 
         if preview is not None:
             from vhquad.preview import check_viz
@@ -209,7 +210,10 @@ def remesh(
         progress(f"reading {mesh}")
         with api.clock(seconds, "read and repair"):
             loaded = api.load(mesh)
-        factor = None if density is None else read_density(loaded, density)
+        factor = None
+        if density is not None:
+            count = loaded.mesh.n_vertices
+            factor = checked_density(read_density(loaded, density), count, f"--density {density}")
         progress("the cross field")
         with api.clock(seconds, "field"):
             if field is not None:
