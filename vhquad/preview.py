@@ -1,28 +1,22 @@
-"""A picture of a remesh: the input, its cross field, the quads, side by side; needs no display.
-
-Drawn by pyvista (the extra ``viz``), off screen, which works without a display or graphics card.
-"""
+"""A picture of a remesh: the input, its cross field, the quads, side by side."""
 
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vhquad.atomic import atomic_path
-from vhquad.errors import ConfigError
 from vhquad.field.cross import CrossField
 from vhquad.field.singular import find_singularities
 from vhquad.field.transport import to_faces
 from vhquad.geometry.frames import face_axes, to_3d
 from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.triangle import TriMesh
+from vhquad.picture import SURFACE, View, open_panel, picture, view_of
 
-__all__ = ["COLOURS", "check_viz", "draw_preview"]
+__all__ = ["COLOURS", "draw_preview"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -32,37 +26,10 @@ COLOURS = {2: "#9b30b0", 3: "#d7301f", 5: "#2166ac", 6: "#08a8a0"}
 
 INDICES = {2: "index +1/2", 3: "index +1/4", 5: "index -1/4", 6: "index -1/2"}
 VALENCES = {2: "valence 2", 3: "valence 3", 5: "valence 5", 6: "valence 6+"}
-PANEL = (760, 860)  # pixels
-SURFACE, CROSS, EDGE = "#dcdcd6", "#3c3c3c", "#303030"
+CROSS, EDGE = "#3c3c3c", "#303030"
 CROSSES = 2500  # drawn, about
 ARM = 0.42  # half a cross, of the mean distance between crosses
 LIFT = 0.12  # of an arm, so that crosses stand clear of the surface
-MARGIN = 1.2
-
-
-@dataclass(frozen=True)
-class _View:
-    """Where the camera stands: the same for all panels."""
-
-    focus: Floats
-    position: Floats
-    up: tuple[float, float, float]
-    scale: float
-
-
-def check_viz() -> None:
-    """Refuse a preview before the long work if its library is missing.
-
-    Raises
-    ------
-    ConfigError
-    """
-    try:
-        import_module("pyvista")
-    except ImportError as error:
-        raise ConfigError(
-            f"a preview needs the extra viz ({error}); install it with: pip install 'vhquad[viz]'"
-        ) from None
 
 
 def draw_preview(
@@ -86,30 +53,17 @@ def draw_preview(
     ConfigError
         If pyvista is not installed.
     """
-    check_viz()
-    pv: Any = import_module("pyvista")
-    vtk: Any = import_module("vtk")
-    vtk.vtkObject.GlobalWarningDisplayOff()  # it complains of the missing display, then copes
-    height = PANEL[1]
-    plotter = pv.Plotter(
-        off_screen=True, shape=(1, 3), window_size=[3 * PANEL[0], height], border=False
-    )
-    try:
-        plotter.set_background("white")
-        view = _view(mesh)
-        _panel(plotter, 0, f"input: {mesh.n_faces:,} triangles", view)
+    with picture(path, 3) as (plotter, pv):
+        view = view_of(mesh)
+        open_panel(plotter, 0, f"input: {mesh.n_faces:,} triangles", view)
         _surface(plotter, pv.PolyData.from_regular_faces(mesh.vertices, mesh.faces), 0.6)
         _field_panel(plotter, pv, mesh, field, view)
         _quad_panel(plotter, pv, quads, view, mesh.diagonal)
-        with atomic_path(path) as temporary:
-            plotter.screenshot(str(temporary))
-    finally:
-        plotter.close()
 
 
-def _field_panel(plotter: Any, pv: Any, mesh: TriMesh, field: CrossField, view: _View) -> None:
+def _field_panel(plotter: Any, pv: Any, mesh: TriMesh, field: CrossField, view: View) -> None:
     singular = find_singularities(mesh, field)
-    _panel(plotter, 1, f"cross field: {len(singular)} singularities", view)
+    open_panel(plotter, 1, f"cross field: {len(singular)} singularities", view)
     smooth = pv.PolyData.from_regular_faces(mesh.vertices, mesh.faces)
     plotter.add_mesh(smooth, color=SURFACE, smooth_shading=True, ambient=0.35, specular=0.0)
     start, end = _segments(mesh, field)
@@ -121,11 +75,11 @@ def _field_panel(plotter: Any, pv: Any, mesh: TriMesh, field: CrossField, view: 
     _marks(plotter, pv, points, 4 - singular.quarters, mesh.diagonal, INDICES)
 
 
-def _quad_panel(plotter: Any, pv: Any, quads: QuadMesh, view: _View, diagonal: float) -> None:
+def _quad_panel(plotter: Any, pv: Any, quads: QuadMesh, view: View, diagonal: float) -> None:
     irregular = np.flatnonzero(
         ~quads.is_boundary_vertex & (quads.valence > 0) & (quads.valence != 4)
     )
-    _panel(plotter, 2, f"{quads.n_quads:,} quads: {len(irregular)} irregular vertices", view)
+    open_panel(plotter, 2, f"{quads.n_quads:,} quads: {len(irregular)} irregular vertices", view)
     if quads.n_quads:
         _surface(plotter, pv.PolyData.from_regular_faces(quads.vertices, quads.quads), 1.2)
     points, valence = quads.vertices[irregular], quads.valence[irregular]
@@ -184,40 +138,3 @@ def _segments(mesh: TriMesh, field: CrossField) -> tuple[Floats, Floats]:
     arms = [length * to_3d(u * turn, axes)[known] for turn in (1.0, 1j)]
     start = np.concatenate([centre - arm for arm in arms])
     return start, np.concatenate([centre + arm for arm in arms])
-
-
-def _panel(plotter: Any, column: int, title: str, view: _View) -> None:
-    plotter.subplot(0, column)
-    plotter.add_text(title, font_size=11, color="black", position="upper_edge", font="arial")
-    plotter.camera.focal_point = view.focus
-    plotter.camera.position = view.position
-    plotter.camera.up = view.up
-    plotter.camera.parallel_projection = True
-    plotter.camera.parallel_scale = view.scale
-
-
-def _view(mesh: TriMesh) -> _View:
-    """From the front, the right and above, all of the mesh in sight and room for the legend."""
-    z_up = _stands_on_z(mesh)
-    up = (0.0, 0.0, 1.0) if z_up else (0.0, 1.0, 0.0)
-    direction = np.array([0.55, -1.0, 0.25] if z_up else [0.55, 0.25, 1.0])
-    direction /= np.linalg.norm(direction)
-    side = np.cross(up, direction)
-    side /= np.linalg.norm(side)
-    top = np.cross(direction, side)
-    focus = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
-    across, along = (mesh.vertices - focus) @ side, (mesh.vertices - focus) @ top
-    focus = focus + 0.5 * ((across.min() + across.max()) * side + (along.min() + along.max()) * top)
-    scale = 0.5 * MARGIN * max(float(np.ptp(along)), float(np.ptp(across)) * PANEL[1] / PANEL[0])
-    focus = focus - 0.05 * scale * top
-    return _View(focus, focus + 3.0 * mesh.diagonal * direction, up, scale)
-
-
-def _stands_on_z(mesh: TriMesh) -> bool:
-    """Guess whether z points up, not y: by where the openings are, as at a neck, if there are."""
-    if mesh.is_closed:
-        return False
-    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-    opening = mesh.vertices[mesh.is_boundary_vertex].mean(axis=0)
-    depth = (0.5 * (low + high) - opening) / np.maximum(high - low, 1e-12 * mesh.diagonal)
-    return bool(depth[2] > max(depth[1], 0.2))

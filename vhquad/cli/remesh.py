@@ -195,7 +195,7 @@ def remesh(
         from vhquad.quad.sizing import checked_density
 
         if preview is not None:
-            from vhquad.preview import check_viz
+            from vhquad.picture import check_viz
 
             check_viz()
         settings = RemeshSettings(
