@@ -1,0 +1,150 @@
+"""The bars that vhquad is held to, each a question to one run and how many must say yes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+__all__ = ["BARS", "CAD", "Bar", "Result", "figures_of", "is_valid"]
+
+Result = dict[str, Any]
+
+_SHAPES = {"cube", "bracket_made", "stepped_block", "cone", "hexagon", "gear", "thin_plate"}
+CAD = frozenset({"cad_bracket", "cad_cube_bored", "wingnut", *_SHAPES})
+"""Meshes whose creases are meant."""
+
+FIRST = ("integer-grid map", "integer-grid map, smoother field")
+
+
+@dataclass(frozen=True)
+class Bar:
+    """One bar.
+
+    Attributes
+    ----------
+    text : str
+    share : float
+        Of the runs that must hold it.
+    applies : callable
+        Whether a run is asked.
+    value : callable
+        What is bad about it, in the unit of the text; the largest is the worst case.
+    limit : float
+        The most that is allowed.
+    """
+
+    text: str
+    share: float
+    applies: Callable[[Result], bool]
+    value: Callable[[Result], float]
+    limit: float
+
+    def held(self, run: Result) -> bool:
+        """Whether a run holds it; one without quads holds nothing."""
+        return bool(figures_of(run)) and self.value(run) <= self.limit
+
+
+def figures_of(run: Result) -> dict[str, Any]:
+    """What the judge found; empty if nothing was made."""
+    figures: dict[str, Any] = run.get("figures") or {}
+    return figures if figures.get("faces") else {}
+
+
+FAULTS = (
+    "non_quads",
+    "nonmanifold_edges",
+    "nonmanifold_vertices",
+    "misoriented_edges",
+    "unused_vertices",
+)
+
+
+def faults(run: Result) -> float:
+    """Faults of an all-quad manifold of the input's topology."""
+    figures = figures_of(run)
+    return sum(figures[name] for name in FAULTS) + (not figures["kept"])
+
+
+def is_valid(run: Result) -> bool:
+    """All quads, manifold, of the input's topology."""
+    return bool(figures_of(run)) and faults(run) == 0
+
+
+def folds(run: Result) -> float:
+    """Quads folded or turned over."""
+    figures = figures_of(run)
+    return float(figures["folded"] + (figures["flipped"] or 0))
+
+
+def fallbacks(run: Result) -> float:
+    """Components that needed more than the first fallback."""
+    return sum(part["method"] not in FIRST for part in run["parts"])
+
+
+def no_fallback(run: Result) -> bool:
+    return bool(run.get("parts")) and not any(part["reason"] for part in run["parts"])
+
+
+def extra_irregular(run: Result) -> float:
+    """By how much the interior irregular vertices off creases differ from the singularities."""
+    figures = figures_of(run)
+    found = dict(figures.get("irregular_off_creases", figures["irregular"]))
+    for part in run["parts"]:
+        for quads, count in part["singularities"].items():
+            found[quads] = found.get(quads, 0) - count
+    return float(sum(abs(n) for n in found.values()))
+
+
+def count_off(run: Result) -> float:
+    """How far the count is off, in % of the target."""
+    return 100.0 * abs(figures_of(run)["faces"] / run["target"] - 1.0)
+
+
+def dense(run: Result) -> bool:
+    return bool(run["target"] > 500)
+
+
+BARS = (
+    Bar("all quads, manifold, the input's topology (faults)", 1.0, lambda r: True, faults, 0),
+    Bar("2,000 and 8,000: no quad folded or turned over (quads)", 0.95, dense, folds, 0),
+    Bar("2,000 and 8,000: never more than 2 of them (quads)", 1.0, dense, folds, 2),
+    Bar(
+        "2,000 and 8,000: at most the first fallback (components)",
+        0.95,
+        lambda r: dense(r) and "parts" in r,
+        fallbacks,
+        0,
+    ),
+    Bar(
+        "500: folded or turned over under 1 % (%)",
+        1.0,
+        lambda r: not dense(r),
+        lambda r: 100.0 * folds(r) / figures_of(r)["faces"],
+        1.0,
+    ),
+    Bar(
+        "no fallback: irregular inside = singularities of the field (vertices)",
+        1.0,
+        no_fallback,
+        extra_irregular,
+        0,
+    ),
+    Bar("count within 5 % (%)", 0.9, lambda r: True, count_off, 5.0),
+    Bar("no fallback: count within 10 % (%)", 1.0, no_fallback, count_off, 10.0),
+    Bar(
+        "boundary vertices on the input's boundary (% of the diagonal)",
+        1.0,
+        lambda r: bool(figures_of(r).get("input", {}).get("loops")),
+        lambda r: figures_of(r).get("border_off", 100.0),
+        1e-4,
+    ),
+    Bar(
+        "2,000 and 8,000, CAD: mean from crease to edge (% of the diagonal)",
+        1.0,
+        lambda r: dense(r) and r["mesh"] in CAD,
+        lambda r: figures_of(r).get("crease_off", 100.0),
+        0.02,
+    ),
+    Bar("memory under 2 GB (MB)", 1.0, lambda r: True, lambda r: float(r["mb"]), 2000.0),
+)
