@@ -16,6 +16,7 @@ import typer
 
 from vhquad import __version__
 from vhquad.cli.check import check
+from vhquad.cli.evaluate import evaluate
 from vhquad.cli.guard import INTERRUPTED, Shell
 from vhquad.cli.predict import predict
 from vhquad.cli.preprocess import preprocess
@@ -40,6 +41,7 @@ app.command()(predict)
 app.command()(check)
 app.command()(preprocess)
 app.command()(train)
+app.command()(evaluate)
 
 
 def _version(value: bool) -> None:

@@ -1,77 +1,120 @@
-"""Measure a model on a dataset's split: the paper's two losses, angles, and baselines beside it.
+"""Measure a model on a dataset's split, with baselines beside it.
 
-All figures are means over meshes of means over the surface, weighted by area times coherence, in
-groups by the samples' variant ("whole", "cropped", ...). The spread is the standard deviation over
-all vertices, weighted likewise, as in the paper's table. A random field scores 1.0 and
-22.5 degrees. "model" is the network alone, "model + curvature" what `vhquad predict` answers.
+"model" is the network alone, "model + curvature" what ``vhquad predict`` answers; "curvature" is
+``--method curvature``. What the figures mean: :mod:`vhquad.learn.scores` and
+:mod:`vhquad.learn.singularities`.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vhquad.errors import DatasetError
+from vhquad.errors import DatasetError, ModelError
 from vhquad.field.cross import CrossField
-from vhquad.learn.baselines import LENGTHS, curvature_aligned, principal, random_field
+from vhquad.learn.baselines import curvature, principal, random_field
 from vhquad.learn.blend import lean_on_curvature
 from vhquad.learn.confidence import confidence
-from vhquad.learn.dataset import Split, open_dataset
+from vhquad.learn.dataset import Dataset, SampleEntry, Split, open_dataset
 from vhquad.learn.device import choose_device
+from vhquad.learn.maps import draw_error_map
 from vhquad.learn.predict import predict_input
+from vhquad.learn.scores import (
+    CalibrationBin,
+    EvaluationRow,
+    FieldErrors,
+    calibration,
+    compare,
+    evaluation_row,
+)
+from vhquad.learn.singularities import (
+    ArtistsPoints,
+    SingularityRow,
+    SingularPoints,
+    after_align,
+    artists,
+    singularity_row,
+)
 from vhquad.mesh.triangle import TriMesh
 from vhquad.nn.checkpoint import Model, load_model
+from vhquad.picture import check_viz
+from vhquad.report import versions
 
-__all__ = ["EvaluationRow", "compare", "evaluate"]
+__all__ = ["ALL", "ANSWER", "Evaluation", "SampleScore", "evaluate"]
 
-Floats = NDArray[np.float64]
+SPLITS: tuple[Split, ...] = ("train", "val", "test")
+MODEL, ANSWER, CURVATURE = "model", "model + curvature", "curvature"
+ARTIST = "ground truth"
+ALL = "all"
 
 
 @dataclass(frozen=True)
-class EvaluationRow:
-    """Figures of one method on one group of samples; angles in degrees.
+class SampleScore:
+    """Losses on one sample, by method; magnitudes of those that have sizes."""
 
-    ``magnitude`` is None for methods that predict no size.
+    name: str
+    shape: str
+    variant: str
+    split: str
+    vertices: int
+    direction: dict[str, float]
+    magnitude: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What :func:`evaluate` found.
+
+    Attributes
+    ----------
+    split : str
+    rows : tuple of EvaluationRow
+        A row for each method and group: all samples together, then each variant ("whole",
+        "cropped" ...) if there are several.
+    singularities : tuple of SingularityRow
+        Likewise, after the smoothing that a remesh applies; "ground truth" is what that leaves of
+        the artist's field itself.
+    calibration : tuple of CalibrationBin
+        Direction losses by stated confidence.
+    samples : tuple of SampleScore
+    versions : dict of str to str
+        Of this package and the libraries that decide the result.
     """
 
-    method: str
-    group: str
-    meshes: int
-    direction: float
-    direction_spread: float
-    magnitude: float | None
-    magnitude_spread: float | None
-    mean_angle: float
-    median_angle: float
-    p95_angle: float
-    over_15: float
+    split: str
+    rows: tuple[EvaluationRow, ...]
+    singularities: tuple[SingularityRow, ...]
+    calibration: tuple[CalibrationBin, ...]
+    samples: tuple[SampleScore, ...]
+    versions: dict[str, str] = field(default_factory=versions)
 
-    def to_dict(self) -> dict[str, Any]:
-        """As plain JSON values."""
-        return asdict(self)
+    def row(self, method: str, group: str = ALL) -> EvaluationRow:
+        """The row of a method and group; KeyError if there is none."""
+        return {(row.method, row.group): row for row in self.rows}[method, group]
 
 
 @dataclass(frozen=True, eq=False)
-class _Errors:
-    weight: Floats  # sums to 1
-    cosine: Floats
-    relative_size: Floats | None
+class _Measured:
+    entry: SampleEntry
+    errors: dict[str, FieldErrors]
+    confidence: NDArray[np.float64]
+    singular: dict[str, SingularPoints | None]
+    artists: ArtistsPoints
 
 
 def evaluate(
     model: Model | Path | str | None,
     datasets: Path | str | Sequence[Path | str],
-    split: Split = "test",
-    baselines: bool = True,
+    split: Split | Literal["all"] = "test",
     device: str = "auto",
+    maps: Path | str | None = None,
     on_sample: Callable[[int, int], None] | None = None,
-) -> list[EvaluationRow]:
+) -> Evaluation:
     """Compare a model, and the baselines, with the ground truth of a split.
 
     Parameters
@@ -79,126 +122,133 @@ def evaluate(
     model : Model or path, optional
         The shipped one if None.
     datasets : path or list of paths
-    split : "train", "val" or "test"
-    baselines : bool
-        Whether to measure the blend with curvature, and random, principal and curvature-aligned
-        fields too. Of the latter's smoothing lengths the best on these very samples is kept.
+        Prepared with the model's features and number of eigenvectors.
+    split : "train", "val", "test" or "all"
     device : str
+    maps : path, optional
+        A folder for pictures of the errors, a PNG file a sample.
     on_sample : callable, optional
         Called with (samples done, samples).
 
     Returns
     -------
-    list of EvaluationRow
+    Evaluation
 
     Raises
     ------
     DatasetError
         If the split is empty, or was prepared otherwise than the model needs.
+    ModelError
+        If the model cannot be read or does not predict crosses.
+    ConfigError
+        If the device does not exist, or maps are wanted without the extra viz.
     """
+    if maps is not None:
+        check_viz()
     chosen = model if isinstance(model, Model) else load_model(model)
+    if chosen.settings.order != 4:
+        raise ModelError(f"only crosses can be evaluated, not order {chosen.settings.order}")
+    paths = [datasets] if isinstance(datasets, (str, Path)) else list(datasets)
+    opened = [open_dataset(path) for path in paths]
+    items = _items(opened, split)
+    for dataset in opened:
+        _check_fit(chosen, dataset)
     target = choose_device(device)
     network = chosen.network.to(target)
-    paths = [datasets] if isinstance(datasets, (str, Path)) else list(datasets)
-    items = [(d, e) for d in map(open_dataset, paths) for e in d.split(split)]
-    if not items:
-        raise DatasetError(f"no sample with ground truth is in the {split} split")
-    errors: dict[str, list[tuple[str, _Errors]]] = {}
+    found = []
     for place, (dataset, entry) in enumerate(items):
-        if (dataset.features, dataset.turned, dataset.k) != (
-            chosen.settings.features,
-            chosen.settings.turned,
-            chosen.settings.k,
-        ):
-            raise DatasetError(
-                f"{dataset.folder} was prepared with other features than the model's"
-            )
+        mesh, truth = dataset.mesh(entry), dataset.truth_field(entry)
         answer = predict_input(network, dataset.load(entry).input.to(target))
-        fields = {"model": CrossField("vertices", answer.z, answer.size)}
-        if baselines:
-            mesh = dataset.mesh(entry)
-            trust = confidence(mesh, answer.agreement)
-            predicted = CrossField("vertices", answer.z, answer.size, trust)
-            fields["model + curvature"] = lean_on_curvature(mesh, predicted)
-            fields |= _baselines(mesh, place)
-        truth, mass = dataset.truth_field(entry), dataset.archive(entry)["mass"]
-        for method, field in fields.items():
-            errors.setdefault(method, []).append((entry.variant, compare(field, truth, mass)))
+        trust = confidence(mesh, answer.agreement)
+        predicted = CrossField("vertices", answer.z, answer.size, trust)
+        fields = {
+            MODEL: predicted,
+            ANSWER: lean_on_curvature(mesh, predicted),
+            CURVATURE: curvature(mesh),
+            "principal": principal(mesh),
+            "random": random_field(mesh, np.random.default_rng(place)),
+        }
+        measured = _measure(entry, mesh, fields, truth, dataset.archive(entry)["mass"])
+        found.append(measured)
+        if maps is not None:
+            path = Path(maps) / f"{entry.name}.png"
+            errors = {name: measured.errors[name] for name in (ANSWER, CURVATURE)}
+            draw_error_map(path, mesh, errors, trust)
         if on_sample is not None:
             on_sample(place + 1, len(items))
-    rows = []
-    for method, found in _best_length(errors).items():
-        for group in sorted({variant for variant, _ in found}):
-            rows.append(_row(method, group, [e for variant, e in found if variant == group]))
-    return rows
+    return _summary(split, found)
 
 
-def compare(field: CrossField, truth: CrossField, mass: Floats) -> _Errors:
-    """Errors of a field at each vertex, with weights; where it has no direction, as random."""
-    coherence = np.ones(len(truth)) if truth.confidence is None else truth.confidence
-    weight = mass * coherence * (truth.z != 0)
-    weight = weight / weight.sum()
-    cosine = (field.z * truth.z.conj()).real.clip(-1.0, 1.0)
-    relative = None
-    if field.size is not None and truth.size is not None:
-        known = truth.size > 0
-        relative = np.zeros(len(truth))
-        relative[known] = np.abs(field.size - truth.size)[known] / truth.size[known]
-    return _Errors(weight, cosine, relative)
-
-
-def _baselines(mesh: TriMesh, seed: int) -> dict[str, CrossField]:
-    aligned = zip(LENGTHS, curvature_aligned(mesh), strict=True)
-    return {
-        "random": random_field(mesh, np.random.default_rng(seed)),
-        "principal": principal(mesh),
-        **{f"curvature-aligned {length}": field for length, field in aligned},
-    }
-
-
-def _best_length(
-    errors: dict[str, list[tuple[str, _Errors]]],
-) -> dict[str, list[tuple[str, _Errors]]]:
-    """Keep the smoothing length with the least direction loss over everything."""
-    tried = {m: found for m, found in errors.items() if m.startswith("curvature-aligned")}
-    kept = {m: found for m, found in errors.items() if m not in tried}
-    if tried:
-        best = min(
-            tried, key=lambda m: float(np.mean([e.weight @ (1 - e.cosine) for _, e in tried[m]]))
+def _items(datasets: list[Dataset], split: str) -> list[tuple[Dataset, SampleEntry]]:
+    names = SPLITS if split == ALL else tuple(name for name in SPLITS if name == split)
+    items = [(d, entry) for d in datasets for name in names for entry in d.split(name)]
+    if not items:
+        counts = {name: sum(len(d.split(name)) for d in datasets) for name in SPLITS}
+        there = ", ".join(f"{count} in {name}" for name, count in counts.items() if count)
+        raise DatasetError(
+            f"no sample with ground truth is in the {split} split ({there or 'nor in any other'})"
         )
-        kept[best] = tried[best]
-    return kept
+    return items
 
 
-def _row(method: str, group: str, errors: list[_Errors]) -> EvaluationRow:
-    weight = np.concatenate([e.weight for e in errors]) / len(errors)
-    cosine = np.concatenate([e.cosine for e in errors])
-    direction, spread = _moments(1.0 - cosine, weight)
-    angle = np.degrees(np.arccos(cosine)) / 4.0
-    order = np.argsort(angle)
-    below = np.cumsum(weight[order])
-    last = len(order) - 1
-    at = [min(int(np.searchsorted(below, q)), last) for q in (0.5, 0.95)]
-    median, p95 = (float(a) for a in angle[order][at])
-    magnitude = magnitude_spread = None
-    if all(e.relative_size is not None for e in errors):
-        relative = np.concatenate([e.relative_size for e in errors if e.relative_size is not None])
-        magnitude, magnitude_spread = _moments(relative, weight)
-    return EvaluationRow(
-        method=method,
-        group=group,
-        meshes=len(errors),
-        direction=direction,
-        direction_spread=spread,
-        magnitude=magnitude,
-        magnitude_spread=magnitude_spread,
-        mean_angle=float(weight @ angle),
-        median_angle=median,
-        p95_angle=p95,
-        over_15=float(weight[angle > 15.0].sum()),
+def _check_fit(model: Model, dataset: Dataset) -> None:
+    for name in ("features", "turned", "k", "in_channels", "order"):
+        if getattr(model.settings, name) != getattr(dataset, name):
+            raise DatasetError(
+                f"the model takes {name} = {getattr(model.settings, name)}, {dataset.folder} was "
+                f"prepared with {getattr(dataset, name)}; preprocess again with the model's"
+            )
+
+
+def _measure(
+    entry: SampleEntry,
+    mesh: TriMesh,
+    fields: dict[str, CrossField],
+    truth: CrossField,
+    mass: NDArray[np.float64],
+) -> _Measured:
+    trust = fields[MODEL].confidence
+    assert trust is not None
+    wanted = artists(mesh, truth)
+    aligned = {ARTIST: truth, ANSWER: fields[ANSWER], CURVATURE: fields[CURVATURE]}
+    return _Measured(
+        entry=entry,
+        errors={method: compare(field, truth, mass) for method, field in fields.items()},
+        confidence=trust,
+        singular={m: after_align(mesh, f, wanted.edge_length) for m, f in aligned.items()},
+        artists=wanted,
     )
 
 
-def _moments(values: Floats, weight: Floats) -> tuple[float, float]:
-    mean = float(weight @ values)
-    return mean, math.sqrt(float(weight @ (values - mean) ** 2))
+def _summary(split: str, found: list[_Measured]) -> Evaluation:
+    variants = sorted({measured.entry.variant for measured in found})
+    groups = {ALL: found}
+    if len(variants) > 1:
+        groups |= {v: [m for m in found if m.entry.variant == v] for v in variants}
+    rows, singularities = [], []
+    for group, members in groups.items():
+        for method in found[0].errors:
+            rows.append(evaluation_row(method, group, [m.errors[method] for m in members]))
+        for method in found[0].singular:
+            pairs = [(m.singular[method], m.artists) for m in members]
+            singularities.append(singularity_row(method, group, pairs))
+    binned = calibration(
+        [m.confidence for m in found],
+        {name: [m.errors[name] for m in found] for name in (MODEL, CURVATURE, ANSWER)},
+    )
+    samples = tuple(_score(measured) for measured in found)
+    return Evaluation(split, tuple(rows), tuple(singularities), binned, samples)
+
+
+def _score(measured: _Measured) -> SampleScore:
+    entry = measured.entry
+    rows = {m: evaluation_row(m, entry.name, [e]) for m, e in measured.errors.items()}
+    return SampleScore(
+        name=entry.name,
+        shape=entry.shape,
+        variant=entry.variant,
+        split=entry.split,
+        vertices=entry.vertices,
+        direction={method: row.direction for method, row in rows.items()},
+        magnitude={m: row.magnitude for m, row in rows.items() if row.magnitude is not None},
+    )
