@@ -18,6 +18,7 @@ from vhquad.geometry.features import (
     hks_gradients,
 )
 from vhquad.geometry.frames import build_frames, from_3d, to_3d, vertex_axes
+from vhquad.geometry.local import RADII
 from vhquad.geometry.laplacian import cotan_laplacian, lumped_mass
 from vhquad.geometry.spectral import Spectrum, smallest_eigenpairs
 from vhquad.mesh.triangle import TriMesh
@@ -32,21 +33,25 @@ def context(mesh: TriMesh, k: int = 48) -> ShapeContext:
 def test_shape_type_and_length(name: str) -> None:
     shape = context(meshes.blob())
     mass = lumped_mass(shape.tri)
-    x = compute_features(name, shape, turned=False)
+    found = compute_features(name, shape, turned=False)
+    x = found.vectors
     # 1. One row a vertex; the number of channels that the name promises.
-    channels = {"hks": len(HKS_TIMES), "gaussian": 1, "mean": 1, "pcd": 2}[name]
+    channels = {"hks": len(HKS_TIMES), "gaussian": 1, "mean": 1, "pcd": 2, "local": 24}[name]
     assert x.shape == (mass.size, channels)
-    assert x.dtype == np.complex128
-    # 2. Mean length 1 over the area.
-    np.testing.assert_allclose(mass @ np.abs(x) / mass.sum(), 1.0, rtol=1e-12)
+    assert found.lines.shape == (mass.size, len(RADII) if name == "local" else 0)
+    assert x.dtype == found.lines.dtype == np.complex128
+    # 2. Mean length 1 over the area, or of that order.
+    length = mass @ np.abs(x) / mass.sum()
+    np.testing.assert_allclose(np.log(length), 0.0, atol=np.log(3) if name == "local" else 1e-12)
     # 3. Turned copies stand behind, all together; principal directions have none.
     both = compute_features(name, shape, turned=True)
     expected = x if name == "pcd" else np.hstack([x, 1j * x])
-    np.testing.assert_array_equal(both, expected)
+    np.testing.assert_array_equal(both.vectors, expected)
+    np.testing.assert_array_equal(both.lines, found.lines)
 
 
 def test_unknown_name() -> None:
-    with pytest.raises(ConfigError, match="choose from hks, gaussian, mean, pcd"):
+    with pytest.raises(ConfigError, match="choose from hks, gaussian, mean, pcd, local"):
         compute_features("shot", context(meshes.tetrahedron()))
 
 
@@ -57,24 +62,33 @@ def test_move_scale_and_relabel(name: str, rng: np.random.Generator) -> None:
     # 1. Rigid motion and scale: the same numbers.
     rigid = meshes.random_rigid(rng)
     other = meshes.moved(rigid.mesh(mesh), (0.0, 5.0, 0.0), 0.01)
-    np.testing.assert_allclose(compute_features(name, context(other)), x, atol=1e-10)
-    # 2. Other labels, hence other frames: the same vectors in space.
+    y = compute_features(name, context(other))
+    np.testing.assert_allclose(y.vectors, x.vectors, atol=1e-10)
+    np.testing.assert_allclose(y.lines, x.lines, atol=1e-10)
+    # 2. Other labels, hence other frames: the same vectors and lines in space.
     relabelled = meshes.relabel(mesh, rng)
     y = compute_features(name, context(relabelled.mesh))
-    axes = vertex_axes(relabelled.mesh)
-    space = to_3d(y, axes)[relabelled.vertex]
-    np.testing.assert_allclose(from_3d(space, vertex_axes(mesh)), x, atol=1e-10)
+    there, here = vertex_axes(relabelled.mesh), vertex_axes(mesh)
+    np.testing.assert_allclose(
+        from_3d(to_3d(y.vectors, there)[relabelled.vertex], here), x.vectors, atol=1e-10
+    )
+    root = from_3d(to_3d(np.sqrt(y.lines), there)[relabelled.vertex], here)
+    np.testing.assert_allclose(root**2, x.lines, atol=1e-10)
 
 
 def test_bending_a_sheet_changes_no_heat_kernel() -> None:
     # 187 vertices: the whole spectrum, in double precision.
-    flat, rolled = (compute_features("hks", context(meshes.sheet(turn=t))) for t in (0.0, 5.0))
+    flat, rolled = (
+        compute_features("hks", context(meshes.sheet(turn=t))).vectors for t in (0.0, 5.0)
+    )
     np.testing.assert_allclose(flat, rolled, atol=1e-9)
 
 
 def test_features_that_a_shape_lacks_stay_small() -> None:
-    for name in ("gaussian", "mean", "pcd"):
-        assert np.abs(compute_features(name, context(meshes.disk()))).max() < 1e-4
+    for name in ("gaussian", "mean", "pcd", "local"):
+        found = compute_features(name, context(meshes.disk()))
+        assert np.abs(found.vectors).max() < 1e-4
+        assert np.abs(found.lines).max(initial=0.0) < 1e-4
 
 
 def test_heat_kernel_of_the_sphere() -> None:
@@ -115,8 +129,8 @@ def test_times_follow_each_component() -> None:
     # With the whole basis, a pair of shapes has the features of each, up to the common length.
     one = meshes.half_sphere()
     pair = meshes.merge(one, meshes.moved(one, (4.0, 0.0, 0.0), 3.0))
-    alone = compute_features("hks", context(one, k=500), turned=False)
-    both = compute_features("hks", context(pair, k=500), turned=False)
+    alone = compute_features("hks", context(one, k=500), turned=False).vectors
+    both = compute_features("hks", context(pair, k=500), turned=False).vectors
     n = one.n_vertices
     for part in (both[:n], both[n:]):
         ratio = np.abs(part).sum(axis=0) / np.abs(alone).sum(axis=0)
@@ -127,7 +141,7 @@ def test_another_triangulation_of_the_same_surface() -> None:
     # The same torus with its diagonals the other way: other triangles, same vertices.
     mesh = meshes.torus(60, 30)
     other = TriMesh(mesh.vertices * [1, -1, 1], mesh.faces[:, ::-1])  # mirrored: diagonals flip
-    a, b = (compute_features("hks", context(m, 128), turned=False) for m in (mesh, other))
+    a, b = (compute_features("hks", context(m, 128), turned=False).vectors for m in (mesh, other))
     nu, nv = 60, 30
     index = np.arange(nu * nv).reshape(nu, nv)[-np.arange(nu) % nu].reshape(-1)
     space = to_3d(b, vertex_axes(other))[index]

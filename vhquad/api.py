@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -25,8 +25,9 @@ from vhquad.mesh.quality import check_quads
 from vhquad.mesh.repair import repair
 from vhquad.mesh.scalars import carried
 from vhquad.mesh.triangle import TriMesh
-from vhquad.quad.pipeline import RemeshResult, RemeshSettings, remesh_mesh
+from vhquad.quad.pipeline import PAIRED, RemeshResult, RemeshSettings, remesh_mesh
 from vhquad.quad.sizing import SIZE_RANGE, checked_density
+from vhquad.quad.stand_in import StandIn, make_stand_in
 from vhquad.report import CheckReport, FieldReport, MeshCounts
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 __all__ = [
     "LoadedMesh",
     "Method",
+    "Predicted",
     "check",
     "clock",
     "describe_field",
@@ -42,11 +44,14 @@ __all__ = [
     "own_field",
     "predict",
     "remesh",
+    "remesh_predicted",
     "remesh_with",
 ]
 
 Method = Literal["learned", "curvature"]
 Progress = Callable[[str, float], None]
+
+GUESSED_QUADS = 10_000  # where only the field will say; predicted sizes make fewer, as a rule
 
 
 def predict(
@@ -120,6 +125,7 @@ def remesh(
     adaptivity: float = 1.0,
     density: ArrayLike | None = None,
     symmetry: str = "off",
+    resolution: Literal["auto", "full"] = "auto",
     seed: int = 0,
     progress: Progress | None = None,
 ) -> RemeshResult:
@@ -148,6 +154,9 @@ def remesh(
         Factor on the quads per area at each vertex.
     symmetry : str
         "x", "y", "z" or "auto" for quads that are their own mirror image; "off".
+    resolution : "auto" or "full"
+        "auto" predicts on decimated copies of large components, and maps a decimated copy of a mesh
+        far finer than its quads; either way quads lie on the mesh itself.
     seed : int
         The same seed gives the same quads.
     progress : callable, optional
@@ -178,19 +187,116 @@ def remesh(
     if density is not None:
         values = checked_density(density, len(np.asarray(vertices)))
         factor = carried(values, repaired.vertex_source, repaired.mesh)
-    with clock(seconds, "field"):
-        cross = own_field(repaired.mesh, field) if field is not None else None
-        if cross is None:
-            cross = predict(repaired.mesh, model, method=method, progress=progress)
-    return remesh_with(
+    lines = repaired.report.lines()
+    if field is not None:
+        with clock(seconds, "field"):
+            cross = own_field(repaired.mesh, field)
+        return remesh_with(
+            repaired.mesh,
+            cross,
+            settings,
+            density=factor,
+            repair_lines=lines,
+            seconds=seconds,
+            progress=progress,
+        )
+
+    def field_of(surface: TriMesh) -> CrossField:
+        return predict(surface, model, method=method, resolution=resolution, progress=progress)
+
+    made = remesh_predicted(
         repaired.mesh,
-        cross,
+        field_of,
         settings,
         density=factor,
-        repair_lines=repaired.report.lines(),
+        stand_in=resolution == "auto",
+        repair_lines=lines,
         seconds=seconds,
         progress=progress,
     )
+    return made.result
+
+
+@dataclass(frozen=True, eq=False)
+class Predicted:
+    """A remesh along a predicted field, and the field with the mesh it lives on."""
+
+    result: RemeshResult
+    field: CrossField
+    mesh: TriMesh
+    """The mesh itself, or its stand-in."""
+
+
+def remesh_predicted(
+    mesh: TriMesh,
+    field_of: Callable[[TriMesh], CrossField],
+    settings: RemeshSettings | None = None,
+    *,
+    creases: ArrayLike | None = None,
+    density: ArrayLike | None = None,
+    stand_in: bool = True,
+    with_uv: bool = False,
+    repair_lines: Sequence[str] = (),
+    seconds: Mapping[str, float] | None = None,
+    progress: Progress | None = None,
+) -> Predicted:
+    """Predict a field and remesh by it, on a stand-in if the mesh is far finer than its quads.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+    field_of : callable
+        Gives the cross field of a mesh.
+    stand_in : bool
+        Whether a decimated copy may take the place of the mesh. It never does where the map was
+        asked for or a symmetry, and if no map is found on it, all is done again on the mesh.
+
+    Other parameters are those of :func:`remesh_with`.
+    """
+    settings = settings or RemeshSettings()
+    spent = dict(seconds or {})
+    guess = GUESSED_QUADS
+    if settings.target_quads is not None:
+        guess = settings.target_quads
+    elif settings.edge_length is not None:
+        guess = max(1, round(mesh.area / settings.edge_length**2))
+    given = None if creases is None else np.asarray(creases, dtype=np.int64).reshape(-1, 2)
+    copy: StandIn | None = None
+    if stand_in and not with_uv and settings.symmetry == "off":
+        with clock(spent, "stand-in"):
+            copy = make_stand_in(mesh, guess, given, settings.crease)
+    if copy is not None:
+        with clock(spent, "field"):
+            cross = field_of(copy.mesh)
+        result = remesh_with(
+            copy.mesh,
+            cross,
+            settings,
+            creases=copy.creases,
+            density=None if density is None else copy.carry(np.asarray(density, dtype=np.float64)),
+            onto=mesh,
+            repair_lines=repair_lines,
+            seconds=spent,
+            progress=progress,
+        )
+        report = result.report
+        if report.asked <= 2 * guess and all(p.method != PAIRED for p in report.components):
+            return Predicted(result, cross, copy.mesh)
+        spent = dict(report.seconds)
+    with clock(spent, "field"):
+        cross = field_of(mesh)
+    result = remesh_with(
+        mesh,
+        cross,
+        settings,
+        creases=given,
+        density=density,
+        with_uv=with_uv,
+        repair_lines=repair_lines,
+        seconds=spent,
+        progress=progress,
+    )
+    return Predicted(result, cross, mesh)
 
 
 def remesh_with(
@@ -200,6 +306,7 @@ def remesh_with(
     *,
     creases: ArrayLike | None = None,
     density: ArrayLike | None = None,
+    onto: TriMesh | None = None,
     with_uv: bool = False,
     repair_lines: Sequence[str] = (),
     seconds: Mapping[str, float] | None = None,
@@ -217,6 +324,8 @@ def remesh_with(
         Vertex pairs of edges to keep, in place of those that the settings find.
     density : (n,) array_like, optional
         Factor on the quads per area at each vertex.
+    onto : TriMesh, optional
+        The surface that the mesh is a stand-in for, see :func:`vhquad.quad.pipeline.remesh_mesh`.
     with_uv : bool
         Make the integer-grid map on the triangles as well.
     repair_lines : sequence of str
@@ -235,14 +344,14 @@ def remesh_with(
         settings,
         creases=creases,
         density=density,
+        onto=onto,
         with_uv=with_uv,
         progress=progress,
     )
-    report = replace(
-        result.report,
-        repair=(*repair_lines, *result.report.repair),
-        seconds={**(seconds or {}), **result.report.seconds},
-    )
+    spent = dict(seconds or {})
+    for step, value in result.report.seconds.items():
+        spent[step] = spent.get(step, 0.0) + value
+    report = replace(result.report, repair=(*repair_lines, *result.report.repair), seconds=spent)
     return replace(result, report=report)
 
 

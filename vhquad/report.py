@@ -156,6 +156,9 @@ class RemeshReport:
         In the order of the input's components; of the half that was mirrored, if one was.
     symmetry : SymmetryReport or None
         None if no symmetry was asked for.
+    stand_in : int or None
+        Triangles of the decimated copy that was remeshed in place of the input, where that is far
+        finer than its quads; the quads were polished on the input itself.
     repair : tuple of str
         What was repaired in the input, a line each.
     seconds : dict of str to float
@@ -175,6 +178,7 @@ class RemeshReport:
     quality: QualityReport | None = None
     components: tuple[ComponentReport, ...] = ()
     symmetry: SymmetryReport | None = None
+    stand_in: int | None = None
     repair: tuple[str, ...] = ()
     seconds: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()

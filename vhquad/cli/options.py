@@ -39,7 +39,7 @@ FullResolution = Annotated[
     bool,
     typer.Option(
         "--full-resolution",
-        help="Predict on the mesh itself, however large, not on a decimated copy.",
+        help="Work on the mesh itself, however large, not on decimated copies.",
     ),
 ]
 NoCache = Annotated[

@@ -25,7 +25,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from vhquad.field.cross import CrossField
     from vhquad.mesh.load import LoadedMesh
+    from vhquad.mesh.triangle import TriMesh
     from vhquad.quad.pipeline import RemeshResult
 
 __all__ = ["remesh"]
@@ -214,13 +216,28 @@ def remesh(
         if density is not None:
             count = loaded.mesh.n_vertices
             factor = checked_density(read_density(loaded, density), count, f"--density {density}")
+        creases = _given_creases(loaded, angle, sharp)
         progress("the cross field")
-        with api.clock(seconds, "field"):
-            if field is not None:
+        if field is not None:
+            with api.clock(seconds, "field"):
                 cross = api.own_field(loaded.mesh, field)
-            else:
-                cross = api.predict(
-                    loaded.mesh,
+            surface = loaded.mesh
+            result = api.remesh_with(
+                surface,
+                cross,
+                settings,
+                creases=creases,
+                density=factor,
+                with_uv=uv_out is not None,
+                repair_lines=loaded.lines(),
+                seconds=seconds,
+                progress=progress,
+            )
+        else:
+
+            def predicted(surface: TriMesh) -> CrossField:
+                return api.predict(
+                    surface,
                     model,
                     method=method.value,
                     resolution="full" if full_resolution else "auto",
@@ -228,17 +245,20 @@ def remesh(
                     cache=not no_cache,
                     progress=progress,
                 )
-        result = api.remesh_with(
-            loaded.mesh,
-            cross,
-            settings,
-            creases=_given_creases(loaded, angle, sharp),
-            density=factor,
-            with_uv=uv_out is not None,
-            repair_lines=loaded.lines(),
-            seconds=seconds,
-            progress=progress,
-        )
+
+            made = api.remesh_predicted(
+                loaded.mesh,
+                predicted,
+                settings,
+                creases=creases,
+                density=factor,
+                stand_in=not full_resolution,
+                with_uv=uv_out is not None,
+                repair_lines=loaded.lines(),
+                seconds=seconds,
+                progress=progress,
+            )
+            result, cross, surface = made.result, made.field, made.mesh
         progress("writing")
         write_quad_mesh(target, result.quads)
         if uv_out is not None:
@@ -247,7 +267,7 @@ def remesh(
             from vhquad.preview import draw_preview
 
             progress("drawing the preview")
-            draw_preview(preview, loaded.mesh, cross, result.quads)
+            draw_preview(preview, surface, cross, result.quads)
     publish(shell, json, result.report, str(target))
     _judge(loaded, result)
 

@@ -90,6 +90,8 @@ def _remesh_table(report: RemeshReport, target: str | None) -> Table:
     if report.symmetry is not None:
         found = report.symmetry
         table.add_row("mirror plane", found.plane if found.made else "not symmetric")
+    if report.stand_in is not None:
+        table.add_row("mapped on a copy of", f"{report.stand_in:,} triangles")
     cancelled = sum(part.cancelled for part in report.components)
     if cancelled:
         table.add_row("singularity pairs cancelled", f"{cancelled}")

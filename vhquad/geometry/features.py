@@ -4,9 +4,11 @@
 "gaussian"  gradient of the Gaussian curvature
 "mean"      gradient of the mean curvature
 "pcd"       the two principal curvature directions
+"local"     gradients of smoothed curvatures and principal lines, see ``local.py``
 
-(Paper, ablation studies.) Every channel is divided by its mean length over the area; copies turned
-by a quarter turn may follow, all together, behind the others.
+(The first four: paper, ablation studies.) Every channel of those is divided by its mean length over
+the area; "local" keeps what its lengths say. Copies turned by a quarter turn may follow, all
+together, behind the others.
 """
 
 from __future__ import annotations
@@ -23,12 +25,14 @@ from vhquad.geometry.curvature import Curvature, vertex_curvature
 from vhquad.geometry.delaunay import IntrinsicTriangulation
 from vhquad.geometry.frames import Frames
 from vhquad.geometry.laplacian import cotan_laplacian, gradient_operator, lumped_mass
+from vhquad.geometry.local import RADII, local_curvature, local_lines, local_vectors
 from vhquad.geometry.spectral import Spectrum, smallest_eigenpairs
 from vhquad.mesh.triangle import TriMesh
 
 __all__ = [
     "FEATURES",
     "HKS_TIMES",
+    "Features",
     "ShapeContext",
     "compute_features",
     "heat_kernel_signature",
@@ -65,21 +69,37 @@ class ShapeContext:
     k: int = 128
 
 
-def compute_features(name: str, shape: ShapeContext, turned: bool = True) -> Complexes:
+@dataclass(frozen=True, eq=False)
+class Features:
+    """What a network is given to see of a mesh, in the vertex frames, without units.
+
+    Attributes
+    ----------
+    vectors : (n, c) complex128
+        Tangent vectors: they turn with the frame.
+    lines : (n, l) complex128
+        Lines, as e^(2ia): they turn twice as fast. Only "local" has any.
+    """
+
+    vectors: Complexes
+    lines: Complexes
+
+
+def compute_features(name: str, shape: ShapeContext, turned: bool = True) -> Features:
     """Features by name.
 
     Parameters
     ----------
-    name : {"hks", "gaussian", "mean", "pcd"}
+    name : {"hks", "gaussian", "mean", "pcd", "local"}
     shape : ShapeContext
     turned : bool
-        Append i times each channel. Never done for "pcd", whose channels are at right angles.
+        Append i times each vector. Never done for "pcd", whose channels are at right angles.
 
     Returns
     -------
-    (n, c) complex128
-        In the vertex frames, without units, mean length 1 (less where the shape has none, as a
-        flat sheet has no curvature).
+    Features
+        All but "local" of mean length 1 (less where the shape has none, as a flat sheet has no
+        curvature).
 
     Raises
     ------
@@ -88,8 +108,10 @@ def compute_features(name: str, shape: ShapeContext, turned: bool = True) -> Com
     """
     if name not in FEATURES:
         raise ConfigError(f"unknown features {name!r}; choose from {', '.join(FEATURES)}")
-    channels = FEATURES[name](shape)
-    return np.hstack([channels, 1j * channels]) if turned and name != "pcd" else channels
+    features = FEATURES[name](shape)
+    if not turned or name == "pcd":
+        return features
+    return Features(np.hstack([features.vectors, 1j * features.vectors]), features.lines)
 
 
 def heat_kernel_signature(spectrum: Spectrum, times: Floats) -> Floats:
@@ -126,30 +148,40 @@ def hks_gradients(spectrum: Spectrum, shape: ShapeContext) -> Complexes:
     return _gradients(signature, signature.mean(axis=0), shape)
 
 
-def _hks(shape: ShapeContext) -> Complexes:
+def _hks(shape: ShapeContext) -> Features:
     mass = lumped_mass(shape.tri)
     spectrum = smallest_eigenpairs(cotan_laplacian(shape.tri), mass, shape.k)
-    return hks_gradients(spectrum, shape)
+    return _vectors(hks_gradients(spectrum, shape))
 
 
-def _gaussian(shape: ShapeContext) -> Complexes:
+def _gaussian(shape: ShapeContext) -> Features:
     typical = 1.0 / shape.tri.face_areas.sum()
-    return _gradients(_curvature(shape).gaussian[:, None], typical, shape)
+    return _vectors(_gradients(_curvature(shape).gaussian[:, None], typical, shape))
 
 
-def _mean(shape: ShapeContext) -> Complexes:
+def _mean(shape: ShapeContext) -> Features:
     typical = 1.0 / np.sqrt(shape.tri.face_areas.sum())
-    return _gradients(_curvature(shape).mean[:, None], typical, shape)
+    return _vectors(_gradients(_curvature(shape).mean[:, None], typical, shape))
 
 
-def _pcd(shape: ShapeContext) -> Complexes:
+def _pcd(shape: ShapeContext) -> Features:
     """Principal directions; a line has no sign, the slope of the mean curvature gives it one."""
     curvature = _curvature(shape)
     slope = gradient_operator(shape.tri) @ curvature.mean
     first = curvature.direction
     second = 1j * first
     channels = [np.where((d * slope.conj()).real < 0, -d, d) for d in (first, second)]
-    return _normalised(np.stack(channels, axis=1), lumped_mass(shape.tri), 0.0)
+    return _vectors(_normalised(np.stack(channels, axis=1), lumped_mass(shape.tri), 0.0))
+
+
+def _local(shape: ShapeContext) -> Features:
+    radii = RADII * np.sqrt(shape.tri.face_areas.sum())
+    curvature = local_curvature(shape.mesh, shape.frames, shape.tri, radii)
+    return Features(local_vectors(curvature), local_lines(curvature))
+
+
+def _vectors(channels: Complexes) -> Features:
+    return Features(channels, np.zeros((len(channels), 0), dtype=np.complex128))
 
 
 def _curvature(shape: ShapeContext) -> Curvature:
@@ -169,10 +201,11 @@ def _normalised(channels: Complexes, mass: Floats, floor: float | Floats) -> Com
     return np.divide(channels, length, out=np.zeros_like(channels), where=length > 0)
 
 
-FEATURES: dict[str, Callable[[ShapeContext], Complexes]] = {
+FEATURES: dict[str, Callable[[ShapeContext], Features]] = {
     "hks": _hks,
     "gaussian": _gaussian,
     "mean": _mean,
     "pcd": _pcd,
+    "local": _local,
 }
 """Names of the features, and what computes them."""

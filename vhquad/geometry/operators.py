@@ -31,10 +31,10 @@ __all__ = [
     "load_or_build",
 ]
 
-OPERATORS_VERSION = 2
+OPERATORS_VERSION = 3
 """Raised whenever the same mesh and settings give other operators; old cache entries then rest."""
 
-_ARRAYS = ("mass", "eigenvalues", "eigenvectors", "features")
+_ARRAYS = ("mass", "eigenvalues", "eigenvectors", "features", "lines")
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,9 @@ class Operators:
     eigenvectors : (n, k) complex128
         ``Phi^H diag(mass) Phi = I``.
     features : (n, c) complex128
-        Without units.
+        Tangent vectors without units.
+    lines : (n, l) complex128
+        Features of order 2, if the chosen ones have any.
     """
 
     mesh: TriMesh
@@ -94,6 +96,7 @@ class Operators:
     eigenvalues: NDArray[np.float64]
     eigenvectors: NDArray[np.complex128]
     features: NDArray[np.complex128]
+    lines: NDArray[np.complex128]
 
     @property
     def area(self) -> float:
@@ -123,13 +126,15 @@ def build_operators(mesh: TriMesh, settings: OperatorSettings | None = None) -> 
     mass = lumped_mass(tri)
     spectrum = smallest_eigenpairs(connection_laplacian(tri, settings.order), mass, settings.k)
     shape = ShapeContext(mesh, frames, tri, settings.k)
+    features = compute_features(settings.features, shape, settings.turned)
     return Operators(
         mesh=mesh,
         settings=settings,
         mass=mass,
         eigenvalues=spectrum.eigenvalues,
         eigenvectors=spectrum.eigenvectors.astype(np.complex128, copy=False),
-        features=compute_features(settings.features, shape, settings.turned),
+        features=features.vectors,
+        lines=features.lines,
     )
 
 
@@ -195,7 +200,7 @@ def _read(path: Path, mesh: TriMesh, settings: OperatorSettings) -> Operators | 
     """The entry at a path, or None if it is absent, damaged, or of the wrong shape."""
     try:
         with open(path, "rb") as handle, np.load(handle, allow_pickle=False) as data:
-            mass, values, vectors, features = (data[name] for name in _ARRAYS)
+            mass, values, vectors, features, lines = (data[name] for name in _ARRAYS)
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None
     n = mesh.n_vertices
@@ -204,13 +209,13 @@ def _read(path: Path, mesh: TriMesh, settings: OperatorSettings) -> Operators | 
         mass.shape == (n,)
         and values.shape == (pairs,)
         and vectors.shape == (n, pairs)
-        and features.ndim == 2
-        and len(features) == n
+        and features.ndim == lines.ndim == 2
+        and len(features) == len(lines) == n
         and mass.dtype == values.dtype == np.float64
-        and vectors.dtype == features.dtype == np.complex128
-        and all(np.isfinite(a).all() for a in (mass, values, vectors, features))
+        and vectors.dtype == features.dtype == lines.dtype == np.complex128
+        and all(np.isfinite(a).all() for a in (mass, values, vectors, features, lines))
     )
-    return Operators(mesh, settings, mass, values, vectors, features) if fits else None
+    return Operators(mesh, settings, mass, values, vectors, features, lines) if fits else None
 
 
 def _write(path: Path, operators: Operators) -> None:

@@ -1,6 +1,6 @@
 """A prepared dataset on disk: an index and one archive a sample.
 
-Layout (version 1)::
+Layout (version 2)::
 
     dataset/
       index.json          what follows, as JSON
@@ -8,17 +8,17 @@ Layout (version 1)::
 
 ``index.json``::
 
-    {"format": "vhquad-dataset", "version": 1,
-     "features": "hks", "turned": true, "k": 128, "in_channels": 30, "order": 4,
+    {"format": "vhquad-dataset", "version": 2,
+     "features": "local", "turned": true, "k": 128, "in_channels": 48, "in_lines": 6, "order": 4,
      "samples": [{"name": "head_0001.t0", "shape": "head_0001", "source": "head_0001.obj",
                   "split": "train", "truth": true, "vertices": 3066, "leak": 0.03,
-                  "variant": "whole" | "deformed" | "cropped" | "pair" | "plain",
+                  "variant": "whole" | "deformed+cropped+rough" (in part) | "pair" | "plain",
                   "key": hash of source and settings}],
      "skipped": [{"source": "broken.obj", "reason": "..."}]}
 
 ``NAME.npz``: ``vertices (n, 3) f64``, ``faces (m, 3) i64``, ``mass (n,) f64``, ``eigenvalues (k,)
-f64``, ``eigenvectors (n, k) c64``, ``features (n, c) c64``; with ground truth also ``z (n,) c128``,
-``size (n,) f64`` (0: unknown), ``coherence (n,) f64``. Frames are those of
+f64``, ``eigenvectors (n, k) c64``, ``features (n, c) c64``, ``lines (n, l) c64``; with ground truth
+also ``z (n,) c128``, ``size (n,) f64`` (0: unknown), ``coherence (n,) f64``. Frames are those of
 ``vhquad.geometry.frames`` for these vertices and faces.
 
 The split goes by *shape*, never by triangulation: all samples of one shape are on one side.
@@ -54,11 +54,11 @@ __all__ = [
 ]
 
 ARRAYS = (
-    "vertices", "faces", "mass", "eigenvalues", "eigenvectors", "features",
+    "vertices", "faces", "mass", "eigenvalues", "eigenvectors", "features", "lines",
     "z", "size", "coherence",
 )  # fmt: skip
 PER_VERTEX = frozenset(ARRAYS) - {"faces", "eigenvalues"}
-FORMAT, VERSION = "vhquad-dataset", 1
+FORMAT, VERSION = "vhquad-dataset", 2
 Split = Literal["train", "val", "test"]
 
 
@@ -100,7 +100,9 @@ class Dataset:
     k : int
         Eigenvectors of each sample.
     in_channels : int
-        Channels of the features.
+        Vectors of the features.
+    in_lines : int
+        Lines of the features.
     order : int
         Symmetry of the ground truth (4: crosses).
     samples : tuple of SampleEntry
@@ -112,6 +114,7 @@ class Dataset:
     turned: bool
     k: int
     in_channels: int
+    in_lines: int
     order: int
     samples: tuple[SampleEntry, ...]
     skipped: tuple[tuple[str, str], ...] = ()
@@ -128,7 +131,7 @@ class Dataset:
         DatasetError
             If its file is missing, damaged or lacks an array.
         """
-        return _read(self.folder, entry, ARRAYS if entry.truth else ARRAYS[:6])
+        return _read(self.folder, entry, ARRAYS if entry.truth else ARRAYS[:7])
 
     def mesh(self, entry: SampleEntry) -> TriMesh:
         """Its triangle mesh."""
@@ -156,12 +159,11 @@ class Dataset:
         DatasetError
             If its file is missing, damaged or does not fit the index.
         """
-        wanted = ["mass", "eigenvalues", "eigenvectors", "features"]
+        wanted = ["mass", "eigenvalues", "eigenvectors", "features", "lines"]
         arrays = _read(
             self.folder, entry, (*wanted, "z", "size", "coherence") if entry.truth else wanted
         )
-        mass, values, vectors, features = (arrays[name] for name in wanted)
-        mesh = network_input(mass, values, vectors, features, dtype=dtype, k=self.k)
+        mesh = network_input(*(arrays[name] for name in wanted), dtype=dtype, k=self.k)
         truth = None
         if entry.truth:
             truth = FieldTruth(
@@ -205,6 +207,7 @@ def open_dataset(folder: Path | str) -> Dataset:
             turned=bool(raw["turned"]),
             k=int(raw["k"]),
             in_channels=int(raw["in_channels"]),
+            in_lines=int(raw["in_lines"]),
             order=int(raw["order"]),
             samples=tuple(_entry(item) for item in raw["samples"]),
             skipped=tuple((str(s["source"]), str(s["reason"])) for s in raw["skipped"]),
@@ -222,6 +225,7 @@ def write_index(dataset: Dataset) -> None:
         "turned": dataset.turned,
         "k": dataset.k,
         "in_channels": dataset.in_channels,
+        "in_lines": dataset.in_lines,
         "order": dataset.order,
         "samples": [asdict(entry) for entry in dataset.samples],
         "skipped": [{"source": source, "reason": reason} for source, reason in dataset.skipped],

@@ -118,6 +118,7 @@ def predict_field(
             operators.eigenvalues,
             operators.eigenvectors,
             operators.features,
+            operators.lines,
             k=chosen.settings.k,
         )
         answer = predict_input(network, given.to(target))

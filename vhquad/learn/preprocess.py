@@ -36,7 +36,7 @@ from vhquad.learn.targets import leak
 __all__ = ["PreprocessSettings", "preprocess"]
 
 MESH_SUFFIXES = (".obj", ".ply", ".off", ".stl", ".glb")
-REVISION = 1  # raise when samples made by older code are no longer good
+REVISION = 2  # raise when samples made by older code are no longer good
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class _Done:
     source: str
     entries: tuple[SampleEntry, ...]
     skipped: tuple[tuple[str, str], ...]
-    in_channels: int | None
+    inputs: tuple[int, int] | None  # vectors and lines
 
 
 def preprocess(
@@ -113,13 +113,14 @@ def preprocess(
     if not entries:
         first = f"; the first: {skipped[0][0]}: {skipped[0][1]}" if skipped else ""
         raise DatasetError(f"none of the {len(jobs)} meshes in {folder} could be used{first}")
-    channels = next(done.in_channels for done in ordered if done.in_channels is not None)
+    channels, lines = next(done.inputs for done in ordered if done.inputs is not None)
     dataset = Dataset(
         folder=out,
         features=settings.features,
         turned=settings.turned,
         k=settings.k,
         in_channels=channels,
+        in_lines=lines,
         order=4,
         samples=entries,
         skipped=skipped,
@@ -199,7 +200,7 @@ def _prepare(job: _Job) -> _Done:
     """All samples of one file."""
     entries: list[SampleEntry] = []
     skipped: list[tuple[str, str]] = []
-    channels = None
+    inputs = None
     try:
         parts = read_source(job.source)
     except (VhquadError, OSError) as error:
@@ -210,16 +211,19 @@ def _prepare(job: _Job) -> _Done:
         for index in range(count):
             name = f"{job.stem}{part.suffix}.t{index}"
             try:
-                entry, channels = _sample(job, part, name, index, digest)
+                entry, inputs = _sample(job, part, name, index, digest)
                 entries.append(entry)
             except VhquadError as error:
                 skipped.append((f"{job.name} ({name})", str(error)))
             except Exception as error:  # third-party code on strange input: name it and go on
                 skipped.append((f"{job.name} ({name})", f"{type(error).__name__}: {error}"))
-    return _Done(job.name, tuple(entries), tuple(skipped), channels)
+    return _Done(job.name, tuple(entries), tuple(skipped), inputs)
 
 
-def _sample(job: _Job, part: Part, name: str, index: int, digest: str) -> tuple[SampleEntry, int]:
+def _sample(
+    job: _Job, part: Part, name: str, index: int, digest: str
+) -> tuple[SampleEntry, tuple[int, int]]:
+    """The entry of one sample, and how many vectors and lines it holds."""
     settings = job.settings
     relevant = {n: v for n, v in asdict(settings).items() if n not in ("val", "test")}
     if part.quads is not None:
@@ -249,17 +253,18 @@ def _sample(job: _Job, part: Part, name: str, index: int, digest: str) -> tuple[
     )
     arrays["entry"] = np.array(json.dumps(asdict(entry)))
     write_sample(job.out, name, arrays)
-    return entry, arrays["features"].shape[1]
+    return entry, (arrays["features"].shape[1], arrays["lines"].shape[1])
 
 
-def _kept(path: Path, key: str) -> tuple[SampleEntry, int] | None:
-    """The entry and the channels of a sample made earlier, if it is whole and has the same key."""
+def _kept(path: Path, key: str) -> tuple[SampleEntry, tuple[int, int]] | None:
+    """The entry, vectors and lines of a sample made earlier, if whole and of the same key."""
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             raw = json.loads(str(archive["entry"]))
             if raw["key"] != key:
                 return None
-            return SampleEntry(**raw), int(archive["features"].shape[1])
+            inputs = archive["features"].shape[1], archive["lines"].shape[1]
+            return SampleEntry(**raw), inputs
     except Exception:  # missing or damaged in any way: make it again
         return None
 

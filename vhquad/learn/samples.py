@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vhquad.errors import ConfigError
 from vhquad.field.cross import CrossField
 from vhquad.geometry.operators import OperatorSettings, build_operators, load_or_build
-from vhquad.learn.augment import crop_height, deform, mirror
+from vhquad.learn.augment import crop_height, deform, mirror, roughen
 from vhquad.learn.sources import Part
 from vhquad.learn.targets import make_target
 from vhquad.mesh.triangle import TriMesh
@@ -41,6 +41,8 @@ class PreprocessSettings:
         Share of the further samples that are cropped.
     deform : float
         Share of the further samples that are deformed and perhaps mirrored.
+    rough : float
+        Share of the further samples with the noise of a scan.
     val, test : float
         Share of the shapes put aside; ``split.json`` in the folder ({"shape": "test", ...}) goes
         first. A shape is named by its path in the folder without suffix, "-" between the folders,
@@ -58,6 +60,7 @@ class PreprocessSettings:
     vertices: tuple[int, int] = (2000, 4000)
     crops: float = 0.75
     deform: float = 0.0
+    rough: float = 0.2
     val: float = 0.1
     test: float = 0.0
     features: str = "hks"
@@ -71,7 +74,7 @@ class PreprocessSettings:
         low, high = self.vertices
         if not 100 <= low <= high:
             raise ConfigError(f"--vertices must be a range from 100 up, not {low} to {high}")
-        for name in ("crops", "deform", "val", "test"):
+        for name in ("crops", "deform", "rough", "val", "test"):
             value = getattr(self, name)
             if not 0.0 <= value <= 1.0:
                 raise ConfigError(f"--{name} must lie between 0 and 1, not {value}")
@@ -108,7 +111,11 @@ def make_sample(
     if index > 0 and rng.random() < settings.crops:
         variant.append("cropped")
         crop = partial(crop_height, rng=rng)
-    target = make_target(vertices, quads, n_vertices, rng, crop)
+    change = None
+    if index > 0 and rng.random() < settings.rough:
+        variant.append("rough")
+        change = partial(roughen, rng=rng)
+    target = make_target(vertices, quads, n_vertices, rng, crop, change)
     return Made(target.mesh, target.field, "+".join(variant) or "whole")
 
 
@@ -130,6 +137,7 @@ def operator_arrays(
         "eigenvalues": operators.eigenvalues,
         "eigenvectors": operators.eigenvectors.astype(np.complex64),
         "features": operators.features.astype(np.complex64),
+        "lines": operators.lines.astype(np.complex64),
     }
 
 

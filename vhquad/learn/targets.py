@@ -27,11 +27,12 @@ from vhquad.learn.subdivide import SQUARE, SubdividedQuads, catmull_clark
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.triangle import TriMesh
 
-__all__ = ["Target", "isotropic_remesh", "leak", "make_target", "split_quads"]
+__all__ = ["Target", "isotropic_remesh", "leak", "make_target", "split_quads", "truth_at"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Crop = Callable[[Floats, Floats], Floats]
+Change = Callable[[TriMesh], TriMesh]
 
 SUBDIVIDE_UP_TO = 12_000  # quads; finer meshes are fine enough as they are
 SAME_SIDE = 0.5  # least cosine between the normals of a vertex and of its closest point
@@ -58,6 +59,7 @@ def make_target(
     n_vertices: int,
     rng: np.random.Generator,
     crop: Crop | None = None,
+    change: Change | None = None,
 ) -> Target:
     """Make one training sample from a quad mesh.
 
@@ -71,6 +73,8 @@ def make_target(
         Draws the diagonals.
     crop : callable, optional
         From fine vertices (N, 3) and their areas (N,) to a height (N,); what is below 0 is cut off.
+    change : callable, optional
+        From the remeshed mesh to another near it; its truth too is that of the fine surface.
 
     Returns
     -------
@@ -94,7 +98,9 @@ def make_target(
         if len(f) == 0:
             raise MeshError("the crop leaves nothing")
     mesh = isotropic_remesh(v, f, n_vertices)
-    return Target(mesh, _truth(mesh, surface, fine, source, slots))
+    if change is not None:
+        mesh = change(mesh)
+    return Target(mesh, truth_at(mesh, surface, fine, source, slots))
 
 
 def split_quads(quads: Ints, rng: np.random.Generator) -> tuple[Ints, Ints, Ints]:
@@ -148,10 +154,20 @@ def isotropic_remesh(vertices: Floats, faces: Ints, n_vertices: int) -> TriMesh:
     return mesh
 
 
-def _truth(
+def truth_at(
     mesh: TriMesh, surface: TriMesh, fine: SubdividedQuads, source: Ints, slots: Ints
 ) -> CrossField:
-    """Steps 3 and 4: the cross at each vertex of ``mesh`` by the closest point of ``surface``."""
+    """Steps 3 and 4: the cross at each vertex of ``mesh`` by the closest point of ``surface``.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+    surface : TriMesh
+        The quads of ``fine``, cut into triangles.
+    fine : SubdividedQuads
+    source, slots
+        As :func:`split_quads` gives them with these triangles.
+    """
     hits = ClosestPoints(surface).query(mesh.vertices)
     child = source[hits.face]
     local = hits.interpolate(SQUARE[slots])  # (n, 2): where in the small quad

@@ -26,7 +26,7 @@ from vhquad.nn.settings import ModelSettings
 __all__ = ["TrainResult", "train"]
 
 Item = tuple[Dataset, SampleEntry]
-SHARED = ("features", "turned", "k", "in_channels", "order")  # of model and datasets
+SHARED = ("features", "turned", "k", "in_channels", "in_lines", "order")  # of model and datasets
 
 
 @dataclass(frozen=True)
@@ -169,6 +169,7 @@ def _network(
         turned=dataset.turned,
         k=dataset.k,
         in_channels=dataset.in_channels,
+        in_lines=dataset.in_lines,
         order=dataset.order,
     )
     with torch.random.fork_rng(devices=[]):

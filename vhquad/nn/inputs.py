@@ -31,6 +31,9 @@ class NetworkInput:
     eigenvalues : (k,) Tensor
         Times A / 4 pi.
     features : (2, n, c) Tensor
+        Tangent vectors.
+    lines : (2, n, l) Tensor
+        Lines, e^(2ia); l may be 0.
     mass : (n,) Tensor
         Shares of the area; they sum to 1.
     length : float
@@ -41,12 +44,13 @@ class NetworkInput:
     weighted_basis: Tensor
     eigenvalues: Tensor
     features: Tensor
+    lines: Tensor
     mass: Tensor
     length: float
 
     def to(self, device: torch.device | str, dtype: torch.dtype | None = None) -> NetworkInput:
         """The same on another device or in another precision."""
-        names = ("basis", "weighted_basis", "eigenvalues", "features", "mass")
+        names = ("basis", "weighted_basis", "eigenvalues", "features", "lines", "mass")
         moved = {name: getattr(self, name).to(device=device, dtype=dtype) for name in names}
         return replace(self, **moved)
 
@@ -78,6 +82,7 @@ def network_input(
     eigenvalues: ArrayLike,
     eigenvectors: ArrayLike,
     features: ArrayLike,
+    lines: ArrayLike | None = None,
     dtype: torch.dtype = torch.float32,
     k: int | None = None,
 ) -> NetworkInput:
@@ -93,6 +98,8 @@ def network_input(
         Orthonormal with respect to ``mass``.
     features : (n, c) complex array_like
         Tangent vectors in the same frames, without units.
+    lines : (n, l) complex array_like, optional
+        Lines, e^(2ia), in the same frames; none if not given.
     dtype : torch.dtype
         Precision of the result.
     k : int, optional
@@ -107,10 +114,15 @@ def network_input(
     m = np.asarray(mass, dtype=np.float64)
     values = np.asarray(eigenvalues, dtype=np.float64)
     phi, x = np.asarray(eigenvectors), np.asarray(features)
-    if m.ndim != 1 or phi.shape != (len(m), len(values)) or x.ndim != 2 or len(x) != len(m):
+    q = np.zeros((len(x), 0), dtype=x.dtype) if lines is None else np.asarray(lines)
+    if (
+        m.ndim != 1
+        or phi.shape != (len(m), len(values))
+        or any(a.ndim != 2 or len(a) != len(m) for a in (x, q))
+    ):
         raise ModelError(
             f"operators do not fit: mass {m.shape}, eigenvalues {values.shape}, "
-            f"eigenvectors {phi.shape}, features {x.shape}"
+            f"eigenvectors {phi.shape}, features {x.shape}, lines {q.shape}"
         )
     area = float(m.sum())
     if not area > 0:
@@ -127,6 +139,7 @@ def network_input(
         weighted_basis=torch.as_tensor(basis * share[:, None], dtype=dtype),
         eigenvalues=torch.as_tensor(values * area / (4.0 * math.pi), dtype=dtype),
         features=stack(x, dtype),
+        lines=stack(q, dtype),
         mass=torch.as_tensor(share, dtype=dtype),
         length=length,
     )

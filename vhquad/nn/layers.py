@@ -15,7 +15,14 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-__all__ = ["MagnitudeReLU", "VectorDropout", "VectorLinear", "VectorMLP", "magnitude_relu"]
+__all__ = [
+    "LineReflection",
+    "MagnitudeReLU",
+    "VectorDropout",
+    "VectorLinear",
+    "VectorMLP",
+    "magnitude_relu",
+]
 
 TINY = 1e-12  # below this modulus a complex number has no direction
 
@@ -87,6 +94,26 @@ class MagnitudeReLU(nn.Module):
     def forward(self, x: Tensor) -> Tensor:
         """(2, n, c) -> (2, n, c)."""
         return magnitude_relu(x, self.bias)
+
+
+class LineReflection(nn.Module):
+    """X + Q conj(X W): vectors also reflected at lines, Q a learned real mix of them a channel.
+
+    A line q = e^(2ia) turns twice as fast as a vector v with the frame: q conj(v), the reflection
+    of v at the line, turns like v. This is how a network of vectors makes use of lines.
+    """
+
+    def __init__(self, channels: int, lines: int) -> None:
+        super().__init__()
+        self.vectors = VectorLinear(channels, channels, gain=0.3)
+        self.lines = VectorLinear(lines, channels, gain=0.3 * math.sqrt(lines))
+
+    def forward(self, x: Tensor, lines: Tensor) -> Tensor:
+        """(2, n, c) and (2, n, l) -> (2, n, c)."""
+        q, y = self.lines(lines), self.vectors(x)
+        re = torch.addcmul(q[0] * y[0], q[1], y[1])
+        im = torch.addcmul(q[1] * y[0], q[0], y[1], value=-1.0)
+        return x + torch.stack([re, im])
 
 
 class VectorDropout(nn.Module):

@@ -13,7 +13,13 @@ from vhquad.errors import ModelError
 from vhquad.nn.diffusion import SpectralDiffusion
 from vhquad.nn.heads import MixedHead, PaperHead
 from vhquad.nn.inputs import NetworkInput
-from vhquad.nn.layers import MagnitudeReLU, VectorDropout, VectorLinear, VectorMLP
+from vhquad.nn.layers import (
+    LineReflection,
+    MagnitudeReLU,
+    VectorDropout,
+    VectorLinear,
+    VectorMLP,
+)
 from vhquad.nn.settings import ModelSettings
 
 __all__ = ["DiffusionBlock", "FieldOutput", "VectorHeatNet"]
@@ -40,11 +46,15 @@ class FieldOutput:
 
 
 class DiffusionBlock(nn.Module):
-    """X + MLP(diffused X); the MLP's first map is applied inside the diffusion."""
+    """X + MLP(diffused X); the MLP's first map is applied inside the diffusion.
+
+    With lines, X is joined by its reflections at them first.
+    """
 
     def __init__(self, settings: ModelSettings) -> None:
         super().__init__()
         c = settings.channels
+        self.reflection = LineReflection(c, settings.in_lines) if settings.in_lines else None
         self.diffusion = SpectralDiffusion(c, c, settings.times, settings.keep_input)
         self.activation = MagnitudeReLU(c)
         self.dropout = VectorDropout(settings.dropout)
@@ -52,6 +62,8 @@ class DiffusionBlock(nn.Module):
 
     def forward(self, x: Tensor, mesh: NetworkInput) -> Tensor:
         """(2, n, c) -> (2, n, c)."""
+        if self.reflection is not None:
+            x = self.reflection(x, mesh.lines)
         hidden = self.dropout(self.activation(self.diffusion(x, mesh)))
         out: Tensor = x + self.mlp(hidden)
         return out
@@ -71,7 +83,7 @@ class VectorHeatNet(nn.Module):
         if settings.head == "paper":
             self.head = PaperHead(c, settings.order)
         else:
-            self.head = MixedHead(c, settings.order, settings.head_terms)
+            self.head = MixedHead(c, settings.order, settings.head_terms, settings.in_lines)
 
     @property
     def n_parameters(self) -> int:
@@ -84,17 +96,18 @@ class VectorHeatNet(nn.Module):
         Raises
         ------
         ModelError
-            If the mesh was prepared with another number of eigenvectors or feature channels.
+            If the mesh was prepared with another number of eigenvectors, channels or lines.
         """
-        k, c_in = len(mesh.eigenvalues), mesh.features.shape[2]
-        if k != self.settings.k or c_in != self.settings.in_channels:
+        own = self.settings
+        k, c_in, lines = len(mesh.eigenvalues), mesh.features.shape[2], mesh.lines.shape[2]
+        if (k, c_in, lines) != (own.k, own.in_channels, own.in_lines):
             raise ModelError(
-                f"the model takes {self.settings.k} eigenvectors and {self.settings.in_channels} "
-                f"feature channels, the mesh comes with {k} and {c_in}; prepare it again with "
-                "the model's settings"
+                f"the model takes {own.k} eigenvectors, {own.in_channels} feature channels and "
+                f"{own.in_lines} lines, the mesh comes with {k}, {c_in} and {lines}; prepare it "
+                "again with the model's settings"
             )
         x = self.enter(mesh.features)
         for block in self.blocks:
             x = block(x, mesh)
-        z, size = self.head(self.leave(x))
+        z, size = self.head(self.leave(x), mesh.lines)
         return FieldOutput(z, size)

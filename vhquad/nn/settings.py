@@ -21,6 +21,9 @@ class ModelSettings:
     ----------
     in_channels : int
         Complex channels of the input features.
+    in_lines : int
+        Lines among the input features; 0 for features that have none. With lines, vectors can be
+        reflected at them before each block, and their squares are terms of the mixed head.
     channels : int
         Complex channels between the blocks, c in the paper.
     blocks : int
@@ -48,6 +51,7 @@ class ModelSettings:
     """
 
     in_channels: int = 30
+    in_lines: int = 0
     channels: int = 128
     blocks: int = 4
     times: int = 4
@@ -66,8 +70,10 @@ class ModelSettings:
             value = getattr(self, name)
             if not isinstance(value, int) or isinstance(value, bool) or value < 1:
                 raise ConfigError(f"model setting {name} must be a whole number >= 1, not {value}")
-        if not isinstance(self.head_terms, int) or self.head_terms < 0:
-            raise ConfigError(f"model setting head_terms must be >= 0, not {self.head_terms}")
+        for name in ("in_lines", "head_terms"):
+            value = getattr(self, name)
+            if not isinstance(value, int) or value < 0:
+                raise ConfigError(f"model setting {name} must be >= 0, not {value}")
         if self.order not in (1, 2, 4):
             raise ConfigError(f"model setting order must be 1, 2 or 4, not {self.order}")
         if self.head not in get_args(Head):

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from vhquad.errors import ConfigError, FieldError, ParametrizationError
 from vhquad.field.align import AlignedField, AlignSettings, align_field
 from vhquad.field.cross import CrossField
+from vhquad.field.density import bend_to_density
 from vhquad.field.features import find_creases
 from vhquad.field.prune import prune_branches
 from vhquad.field.transport import to_faces
@@ -148,6 +149,7 @@ def remesh_mesh(
     *,
     creases: ArrayLike | None = None,
     density: ArrayLike | None = None,
+    onto: TriMesh | None = None,
     with_uv: bool = False,
     progress: Progress | None = None,
 ) -> RemeshResult:
@@ -165,6 +167,9 @@ def remesh_mesh(
     density : (n,) array_like, optional
         Factor on the quads per area at each vertex, positive; twice the density makes edges
         shorter by the root of two. With a count asked for only ratios matter.
+    onto : TriMesh, optional
+        The surface that the mesh is a decimated stand-in for, with the same components: quads are
+        polished on it and judged against it. Without a symmetry only.
     with_uv : bool
         Make the integer-grid map too; with a symmetry, that of the half.
     progress : callable, optional
@@ -180,6 +185,9 @@ def remesh_mesh(
         If a symmetry is asked for whose plane leaves no half to mirror.
     """
     settings = settings or RemeshSettings()
+    if onto is not None and settings.symmetry != "off":
+        raise ConfigError("a stand-in cannot be mirrored; leave out --symmetry or onto")
+    original = mesh if onto is None else onto
     watch = _Watch()
     if field.domain == "vertices":
         if len(field) != mesh.n_vertices:
@@ -189,19 +197,24 @@ def remesh_mesh(
         field = to_faces(mesh, field)
     if len(field) != mesh.n_faces:
         raise FieldError(f"the field has {len(field)} crosses, the mesh {mesh.n_faces} faces")
+    factor = None if density is None else checked_density(density, mesh.n_vertices)
     size, asked = wanted_sizes(
         mesh,
         field,
         adaptivity=settings.adaptivity,
-        density=None if density is None else checked_density(density, mesh.n_vertices),
+        density=factor,
         target_quads=settings.target_quads,
         edge_length=settings.edge_length,
     )
     field = replace(field, size=size)
+    if factor is not None:
+        field = bend_to_density(mesh, field, factor, float(np.sqrt(mesh.area / asked)))
     given = None if creases is None else np.asarray(creases, dtype=np.int64).reshape(-1, 2)
-    result, parts, symmetry = _remesh(mesh, field, given, settings, with_uv, watch, progress)
+    result, parts, symmetry = _remesh(
+        mesh, field, given, settings, original, with_uv, watch, progress
+    )
     with watch("check"):
-        quality = check_quads(result, mesh)
+        quality = check_quads(result, original)
     seconds = dict(watch.seconds)
     for part in parts:
         for step, value in part.report.seconds.items():
@@ -209,11 +222,12 @@ def remesh_mesh(
     report = RemeshReport(
         asked=asked,
         made=result.n_quads,
-        input=MeshCounts.of(mesh),
+        input=MeshCounts.of(original),
         output=MeshCounts.of(result),
         quality=quality,
         components=tuple(part.report for part in parts),
         symmetry=symmetry,
+        stand_in=None if onto is None else mesh.n_faces,
         seconds=seconds,
         settings={name: getattr(settings, name) for name in RemeshSettings.__dataclass_fields__},
     )
@@ -225,6 +239,7 @@ def _remesh(
     field: CrossField,
     given: Ints | None,
     settings: RemeshSettings,
+    original: TriMesh,
     with_uv: bool,
     watch: _Watch,
     progress: Progress | None,
@@ -234,7 +249,8 @@ def _remesh(
     def remesh_parts(
         half: TriMesh, own: CrossField, creases: Ints | None, seam: Bools | None
     ) -> list[Part]:
-        return _remesh_parts(half, own, creases, seam, settings.crease, with_uv, progress)
+        surface = original if half is mesh else half
+        return _remesh_parts(half, own, creases, seam, settings.crease, surface, with_uv, progress)
 
     symmetry: SymmetryReport | None = None
     if settings.symmetry != "off":
@@ -257,6 +273,7 @@ def _remesh_parts(
     given: Ints | None,
     seam: Bools | None,
     angle: float | None,
+    original: TriMesh,
     with_uv: bool,
     progress: Progress | None,
 ) -> list[Part]:
@@ -287,7 +304,13 @@ def _remesh_parts(
         )
         target = max(round(float(density[inside].sum())), LEAST_QUADS)
         edge = None if seam is None else seam.reshape(-1, 3)[inside].reshape(-1)
-        parts.append(_remesh_part(part, part_field, own, edge, angle, target, with_uv, tell))
+        whole = part
+        if original is not mesh:
+            whole, _ = original.submesh(original.face_component == number)
+        surface = ClosestPoints(whole)
+        parts.append(
+            _remesh_part(part, part_field, own, edge, angle, target, surface, with_uv, tell)
+        )
     return parts
 
 
@@ -317,7 +340,7 @@ class _Attempt:
         return prune_branches(mesh, found, LOOSE_CREASE * length)
 
 
-MAP = "integer-grid map"
+MAP, PAIRED = "integer-grid map", "paired triangles"
 _ATTEMPTS = (
     _Attempt(MAP, 0.5, 2.5),
     _Attempt(f"{MAP}, smoother field", 1.5, 8.0),
@@ -333,12 +356,12 @@ def _remesh_part(
     seam: Bools | None,
     angle: float | None,
     target: int,
+    surface: ClosestPoints,
     with_uv: bool,
     tell: Progress,
 ) -> Part:
     """Quads of one component by the first attempt that gives a valid mesh of about the count."""
     watch = _Watch()
-    surface = ClosestPoints(mesh)
     length = float(np.sqrt(mesh.area / target))
     reasons: list[str] = []
     best: tuple[float, _Mapped, str] | None = None
@@ -366,7 +389,7 @@ def _remesh_part(
     else:
         with watch("fallback"):
             quads = triangles_to_quads(mesh, target, angle=field.angle)
-        method, singularities, cancelled = "paired triangles", {}, 0
+        method, singularities, cancelled = PAIRED, {}, 0
     tell("done", 1.0)
     report = ComponentReport(
         vertices=mesh.n_vertices,

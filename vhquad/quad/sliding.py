@@ -50,7 +50,8 @@ class State:
 
     vertices: Floats
     arc: Floats  # (n,) arc length of ``on_curve`` vertices on their curves, 0 elsewhere
-    normals: Floats  # (n, 3) surface normals
+    normals: Floats  # (n, 3) surface normals, smooth
+    facets: Floats  # (n, 3) normals of the surface's faces at the vertices
     quad_normals: Floats  # (k, 3) reference normals of the energy
     folded: Bools  # (k,)
     energy: float  # at the least epsilon, to rank states
@@ -79,7 +80,7 @@ def make_problem(
     np.minimum.at(reach, quads.reshape(-1), np.repeat(size, 4))
     sliding = (curves.curve >= 0) & ~fixed
     # A crease has two normals: prefer those of a quad's plain vertices.
-    trust = np.where(curves.curve >= 0, 0.01, 1.0)
+    trust = np.where((curves.curve >= 0) | fixed, 0.01, 1.0)
     return Problem(quads, surface, curves, fixed, size, np.flatnonzero(sliding), reach, trust)
 
 
@@ -89,6 +90,7 @@ def place(problem: Problem, wanted: Floats, before: State | None) -> State:
     hits = problem.surface.query(wanted)
     normals = mesh.vertex_normals[mesh.faces[hits.face]]
     normals = unit(np.einsum("qk,qki->qi", hits.barycentric, normals))
+    facets = mesh.face_normals[hits.face]
     x = np.array(hits.point)
     if before is None:
         arc = np.zeros(len(x))
@@ -103,20 +105,27 @@ def place(problem: Problem, wanted: Floats, before: State | None) -> State:
         wrong_side[line] = False
         keep = problem.fixed | wrong_side
         x[keep], normals[keep] = before.vertices[keep], before.normals[keep]
+        facets[keep] = before.facets[keep]
     x[line] = problem.curves.position(line, arc[line])
-    return measure(problem, x, arc, normals)
+    return measure(problem, x, arc, normals, facets)
 
 
-def measure(problem: Problem, x: Floats, arc: Floats, normals: Floats) -> State:
-    """The state of given positions, arc lengths and vertex normals."""
+def measure(problem: Problem, x: Floats, arc: Floats, normals: Floats, facets: Floats) -> State:
+    """The state of given positions, arc lengths and normals at the vertices.
+
+    Beside a sharp edge the smooth normal lies across; there a quad is right if it faces as the
+    surface does at one of its corners.
+    """
     quads = problem.quads
-    around = reference_normals(problem, normals)
-    folded = folded_quads(x, quads, around)
-    own = quad_normals(x, quads)
-    trusted = ~folded & (np.einsum("ki,ki->k", own, around) > 0.3)
+    around, own = reference_normals(problem, normals), quad_normals(x, quads)
+    facing = np.einsum("ki,ki->k", own, around)
+    nearest = np.einsum("kci,ki->kc", facets[quads], own).max(axis=1)
+    inverted = (corner_jacobians(x, quads, own) <= 0).any(axis=1)
+    folded = inverted | ((facing <= 0) & (nearest <= 0))
+    trusted = ~folded & ((facing > 0.3) | (nearest > 0.7))
     reference = np.where(trusted[:, None], own, around)
     energy = distortion(x, quads, reference, problem.size, 1e-3, SIZE_WEIGHT, False).energy
-    return State(x, arc, normals, reference, folded, energy)
+    return State(x, arc, normals, facets, reference, folded, energy)
 
 
 def reference_normals(problem: Problem, normals: Floats) -> Floats:

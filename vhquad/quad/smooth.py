@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from vhquad.errors import MeshError
 from vhquad.mesh.closest import ClosestPoints
@@ -26,9 +28,10 @@ Bools = NDArray[np.bool_]
 
 SPREAD_ITERATIONS = 10
 POOR = 0.1  # a quad with a scaled Jacobian below this gets a patch problem of its own
-PATCH_RINGS = 4
+FOLDED_ROUNDS = ((4, 0), (4, 5), (4, 0))  # rings around, and steps of spreading
+POOR_ROUNDS = 2
+POOR_RINGS = 4
 PATCH_ITERATIONS = 40
-PATCH_ROUNDS = 4
 PATIENCE = 60
 LOOSE_ROUNDS = 3
 
@@ -111,7 +114,7 @@ def smooth_quads(
         if not state.folded.any():
             break
         problem = _loosened(problem, state)
-        state = _mended(problem, state, POOR)
+        state = _mended(problem, state, 0.0)
     return state.vertices
 
 
@@ -147,25 +150,46 @@ def _loosened(problem: Problem, state: State) -> Problem:
 
 
 def _mended(problem: Problem, state: State, least: float) -> State:
-    """Solve patches around folded quads and those with scaled Jacobians below ``least``."""
-    for _ in range(PATCH_ROUNDS):
-        jacobians = corner_jacobians(state.vertices, problem.quads, state.quad_normals)
-        poor = state.folded | (jacobians.min(axis=1) < least)
-        if not poor.any():
+    """Solve patches around folded quads; without any, around those with Jacobians below least."""
+    for rings, spreading in FOLDED_ROUNDS:
+        if not state.folded.any():
             break
-        before, state = state, _repair_patches(problem, state, poor)
-        if not better(state, before):
-            break
+        for patch in _components(problem, _rings(problem, state.folded, rings)):  # few
+            state = _solve_patch(problem, state, patch, spreading)
+    if not state.folded.any():
+        for _ in range(POOR_ROUNDS):
+            jacobians = corner_jacobians(state.vertices, problem.quads, state.quad_normals)
+            poor = jacobians.min(axis=1) < least
+            if not poor.any():
+                break
+            state = _solve_patch(problem, state, _rings(problem, poor, POOR_RINGS), 0)
     return state
 
 
-def _repair_patches(problem: Problem, state: State, poor: Bools) -> State:
-    """Minimise again over the rings around poor quads only, the rest held."""
-    inside = poor
-    for _ in range(PATCH_RINGS):
+def _rings(problem: Problem, core: Bools, number: int) -> Bools:
+    """Quads within some rings of a core."""
+    for _ in range(number):
         touched = np.zeros(len(problem.fixed), dtype=bool)
-        touched[problem.quads[inside]] = True
-        inside = np.asarray(touched[problem.quads].any(axis=1))
+        touched[problem.quads[core]] = True
+        core = np.asarray(touched[problem.quads].any(axis=1))
+    return core
+
+
+def _components(problem: Problem, inside: Bools) -> list[Bools]:
+    """Some quads in parts that share no vertex."""
+    quads = problem.quads[inside]
+    rows = np.repeat(np.arange(len(quads)), 4)
+    touching = coo_matrix(
+        (np.ones(len(rows), dtype=np.int32), (rows, quads.reshape(-1))),
+        shape=(len(quads), len(problem.fixed)),
+    ).tocsr()
+    number, label = connected_components(touching @ touching.T, directed=False)
+    where = np.flatnonzero(inside)
+    return [np.isin(np.arange(len(inside)), where[label == i]) for i in range(number)]
+
+
+def _solve_patch(problem: Problem, state: State, inside: Bools, spreading: int) -> State:
+    """Minimise again over some quads only, their outer vertices held."""
     held = np.ones(len(problem.fixed), dtype=bool)
     held[problem.quads[inside]] = False
     held[problem.quads[~inside]] = True
@@ -179,9 +203,14 @@ def _repair_patches(problem: Problem, state: State, poor: Bools) -> State:
     )
     if part.fixed.all():
         return state
-    start = place(part, state.vertices[used], None)
-    solved = descend(part, start, laplacian_factor(part), PATCH_ITERATIONS, PATIENCE)
-    merged = [np.array(old) for old in (state.vertices, state.arc, state.normals)]
-    for whole, new in zip(merged, (solved.vertices, solved.arc, solved.normals), strict=True):
-        whole[used] = new
+    names = ("vertices", "arc", "normals", "facets")
+    start = measure(part, *(getattr(state, name)[used] for name in names))
+    factor = laplacian_factor(part)
+    solved = spread(part, start, factor, spreading)
+    solved = descend(part, solved, factor, PATCH_ITERATIONS, PATIENCE)
+    if better(start, solved):
+        return state
+    merged = [np.array(getattr(state, name)) for name in names]
+    for whole, name in zip(merged, names, strict=True):
+        whole[used] = getattr(solved, name)
     return measure(problem, *merged)

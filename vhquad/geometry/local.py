@@ -1,0 +1,150 @@
+"""Local features: curvature, how it changes, and the lines along which it is largest.
+
+Curvature is a measure, as in ``curvature.py``, here smoothed over neighbourhoods of six metric
+radii, from a fine mesh's edge to a good part of the shape, by two implicit Euler steps of heat
+diffusion each (one step smooths too little for a gradient to be taken). What lies farther away than
+the radius hardly counts, so that a shape looks the same after a part of it was cut off, up to the
+unit: radii are shares of the square root of the area.
+
+Tangent vectors: the gradients of the Gaussian and of the mean curvature, and the same gradients
+reflected at the principal lines. Lines: the deviatoric shape operator. Values are in units of their
+radius, so that they have no unit, divided by a typical value and compressed: the longer, the more,
+but no longer than the logarithm of what they were. Unlike the heat kernel and the Gaussian
+curvature, mean curvature and lines know how the surface lies in space: these features follow rigid
+motion and change of scale, not bending.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix, diags_array
+from scipy.sparse.linalg import splu
+
+from vhquad.geometry.curvature import angle_defect, dihedral_angles
+from vhquad.geometry.delaunay import IntrinsicTriangulation
+from vhquad.geometry.frames import Frames
+from vhquad.geometry.laplacian import (
+    connection_laplacian,
+    cotan_laplacian,
+    gradient_operator,
+    lumped_mass,
+)
+from vhquad.mesh.triangle import TriMesh
+
+__all__ = ["RADII", "LocalCurvature", "local_curvature", "local_lines", "local_vectors"]
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+RADII = np.array([0.02, 0.032, 0.05, 0.08, 0.125, 0.2])
+"""Radii of the neighbourhoods in square roots of the area (a head's mouth is about 0.1)."""
+
+GAUSSIAN_SLOPE = np.array([0.014, 0.033, 0.064, 0.12, 0.22, 0.36])
+MEAN_SLOPE = np.array([0.029, 0.043, 0.062, 0.091, 0.14, 0.20])
+LINE = 0.075
+"""Typical moduli, of heads and other shapes, whole and cropped, in units of the radii."""
+
+STEPS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class LocalCurvature:
+    """Curvature at each vertex over several neighbourhoods, in units of their radii.
+
+    Attributes
+    ----------
+    gaussian_slope : (n, r) complex128
+        Gradient of the Gaussian curvature times radius^3.
+    mean_slope : (n, r) complex128
+        Gradient of the mean curvature times radius^2.
+    line : (n, r) complex128
+        ``(k1 - k2) / 2 exp(2i a)`` times the radius, a the angle of the direction of k1.
+    """
+
+    gaussian_slope: Complexes
+    mean_slope: Complexes
+    line: Complexes
+
+
+def local_curvature(
+    mesh: TriMesh, frames: Frames, tri: IntrinsicTriangulation, radii: Floats
+) -> LocalCurvature:
+    """Smoothed curvatures.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+    frames : Frames
+    tri : IntrinsicTriangulation
+        Delaunay, of the same mesh and frames.
+    radii : (r,) float64
+        In units of the mesh.
+
+    References
+    ----------
+    Cohen-Steiner and Morvan 2003, "Restricted Delaunay Triangulations and Normal Cycle".
+    """
+    mass, n = lumped_mass(tri), mesh.n_vertices
+    # Each end of an edge gets half of its dihedral measure; the surface bends across the edge.
+    bend = 0.5 * dihedral_angles(mesh) * frames.lengths.reshape(-1)
+    turned = -0.5 * bend * np.exp(2j * frames.halfedge_angle)
+    line = np.bincount(mesh.tail, turned.real, n) + 1j * np.bincount(mesh.tail, turned.imag, n)
+    # The defect of a border vertex is no curvature: its area is left out of the mean.
+    inside = np.where(mesh.is_boundary_vertex, 0.0, mass)
+    bends = 0.5 * np.bincount(mesh.tail, bend, n)
+    numbers = np.stack([bends, mass, angle_defect(mesh, frames), inside], axis=1) / mass[:, None]
+    scalar, lines = cotan_laplacian(tri), connection_laplacian(tri, order=2)
+    gradient = gradient_operator(tri)
+    slopes: tuple[list[Complexes], list[Complexes], list[Complexes]] = ([], [], [])
+    for radius in radii:
+        near = _smoother(scalar, mass, radius**2)(numbers)
+        gaussian = np.divide(near[:, 2], near[:, 3], out=np.zeros(n), where=near[:, 3] > 1e-12)
+        slopes[0].append(radius**3 * (gradient @ gaussian))
+        slopes[1].append(radius**2 * (gradient @ (near[:, 0] / near[:, 1])))
+        slopes[2].append(radius * _smoother(lines, mass, radius**2)(line / mass) / near[:, 1])
+    return LocalCurvature(*(np.stack(part, axis=1) for part in slopes))
+
+
+def local_vectors(curvature: LocalCurvature) -> Complexes:
+    """Tangent vectors of the network's input; (n, 4 r) complex128.
+
+    The two gradients, then both reflected at the lines (times the lines' strength).
+    """
+    q = curvature.line / LINE
+    slopes = curvature.gaussian_slope / GAUSSIAN_SLOPE, curvature.mean_slope / MEAN_SLOPE
+    reflected = (q * s.conj() / np.sqrt(1.0 + np.abs(s) ** 2) for s in slopes)
+    return np.hstack([_compressed(part) for part in (*slopes, *reflected)])
+
+
+def local_lines(curvature: LocalCurvature) -> Complexes:
+    """Second-order input of the network; (n, r) complex128."""
+    return _compressed(curvature.line / LINE)
+
+
+def _compressed(x: Complexes) -> Complexes:
+    """The same direction, the inverse hyperbolic sine of the length."""
+    length = np.abs(x)
+    return x * np.divide(np.arcsinh(length), length, out=np.ones_like(length), where=length > 1e-9)
+
+
+def _smoother(laplacian: csr_matrix, mass: Floats, time: float) -> Callable[[NDArray], NDArray]:
+    """Heat diffusion for a time, in ``STEPS`` implicit Euler steps of one factorisation."""
+    system = (diags_array(mass) + time / STEPS * laplacian).tocsc()
+    factor = splu(
+        system,
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True},
+    )
+
+    def smooth(u: NDArray) -> NDArray:
+        weight = mass.reshape((-1,) + (1,) * (u.ndim - 1))
+        for _ in range(STEPS):
+            u = factor.solve(weight * u)
+        return u
+
+    return smooth
