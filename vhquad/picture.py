@@ -17,9 +17,12 @@ from numpy.typing import NDArray
 
 from vhquad.atomic import atomic_path
 from vhquad.errors import ConfigError
+from vhquad.field.cross import CrossField
+from vhquad.field.transport import to_faces
+from vhquad.geometry.frames import face_axes, to_3d
 from vhquad.mesh.triangle import TriMesh
 
-__all__ = ["SURFACE", "View", "check_viz", "open_panel", "picture", "view_of"]
+__all__ = ["SURFACE", "View", "check_viz", "draw_crosses", "open_panel", "picture", "view_of"]
 
 Floats = NDArray[np.float64]
 
@@ -27,6 +30,10 @@ PANEL = (760, 860)  # pixels
 MARGIN = 1.2
 SURFACE = "#dcdcd6"
 """Colour of a surface that shows nothing else."""
+CROSS = "#3c3c3c"
+CROSSES = 2500  # drawn, about
+ARM = 0.42  # half a cross, of the mean distance between crosses
+LIFT = 0.12  # of an arm, so that crosses stand clear of the surface
 
 
 @dataclass(frozen=True)
@@ -55,8 +62,17 @@ def check_viz() -> None:
 
 
 @contextmanager
-def picture(path: str | os.PathLike[str], panels: int) -> Iterator[tuple[Any, Any]]:
+def picture(
+    path: str | os.PathLike[str], panels: int, panel: tuple[int, int] = PANEL
+) -> Iterator[tuple[Any, Any]]:
     """A row of panels to draw into, written to a PNG file on leaving, whole or not at all.
+
+    Parameters
+    ----------
+    path : str or PathLike
+    panels : int
+    panel : (int, int)
+        Width and height of each, in pixels.
 
     Yields
     ------
@@ -72,7 +88,7 @@ def picture(path: str | os.PathLike[str], panels: int) -> Iterator[tuple[Any, An
     pv: Any = import_module("pyvista")
     vtk: Any = import_module("vtk")
     vtk.vtkObject.GlobalWarningDisplayOff()  # it complains of the missing display, then copes
-    size = [panels * PANEL[0], PANEL[1]]
+    size = [panels * panel[0], panel[1]]
     plotter = pv.Plotter(off_screen=True, shape=(1, panels), window_size=size, border=False)
     try:
         plotter.set_background("white")
@@ -92,6 +108,34 @@ def open_panel(plotter: Any, column: int, title: str, view: View) -> None:
     plotter.camera.up = view.up
     plotter.camera.parallel_projection = True
     plotter.camera.parallel_scale = view.scale
+
+
+def draw_crosses(
+    plotter: Any, pv: Any, mesh: TriMesh, field: CrossField, count: int = CROSSES
+) -> None:
+    """Lay about so many crosses of a field on the surface, into the open panel."""
+    start, end = _segments(mesh, field, count)
+    n = len(start)
+    ends = np.stack([np.full(n, 2), np.arange(n), np.arange(n) + n], axis=1)
+    lines = pv.PolyData(np.concatenate([start, end]), lines=ends)
+    plotter.add_mesh(lines, color=CROSS, line_width=1.6, lighting=False)
+
+
+def _segments(mesh: TriMesh, field: CrossField, count: int) -> tuple[Floats, Floats]:
+    """Both lines of a cross at faces spread evenly over the surface; ends (2q, 3) each."""
+    crosses = field if field.domain == "faces" else to_faces(mesh, field)
+    spacing = np.sqrt(mesh.area / count)
+    centre = mesh.vertices[mesh.faces].mean(axis=1)
+    known = np.flatnonzero((crosses.z != 0) & (mesh.face_areas > 0))
+    cell = np.floor(centre[known] / spacing).astype(np.int64)
+    known = known[np.unique(cell, axis=0, return_index=True)[1]]
+    length = ARM * np.sqrt(mesh.area / max(len(known), 1))
+    axes = face_axes(mesh)
+    u = np.exp(1j * crosses.angle)
+    centre = centre[known] + LIFT * length * mesh.face_normals[known]
+    arms = [length * to_3d(u * turn, axes)[known] for turn in (1.0, 1j)]
+    start = np.concatenate([centre - arm for arm in arms])
+    return start, np.concatenate([centre + arm for arm in arms])
 
 
 def view_of(mesh: TriMesh) -> View:

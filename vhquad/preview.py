@@ -10,11 +10,9 @@ from numpy.typing import NDArray
 
 from vhquad.field.cross import CrossField
 from vhquad.field.singular import find_singularities
-from vhquad.field.transport import to_faces
-from vhquad.geometry.frames import face_axes, to_3d
 from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.triangle import TriMesh
-from vhquad.picture import SURFACE, View, open_panel, picture, view_of
+from vhquad.picture import SURFACE, View, draw_crosses, open_panel, picture, view_of
 
 __all__ = ["COLOURS", "draw_preview"]
 
@@ -26,10 +24,7 @@ COLOURS = {2: "#9b30b0", 3: "#d7301f", 5: "#2166ac", 6: "#08a8a0"}
 
 INDICES = {2: "index +1/2", 3: "index +1/4", 5: "index -1/4", 6: "index -1/2"}
 VALENCES = {2: "valence 2", 3: "valence 3", 5: "valence 5", 6: "valence 6+"}
-CROSS, EDGE = "#3c3c3c", "#303030"
-CROSSES = 2500  # drawn, about
-ARM = 0.42  # half a cross, of the mean distance between crosses
-LIFT = 0.12  # of an arm, so that crosses stand clear of the surface
+EDGE = "#303030"
 
 
 def draw_preview(
@@ -66,11 +61,7 @@ def _field_panel(plotter: Any, pv: Any, mesh: TriMesh, field: CrossField, view: 
     open_panel(plotter, 1, f"cross field: {len(singular)} singularities", view)
     smooth = pv.PolyData.from_regular_faces(mesh.vertices, mesh.faces)
     plotter.add_mesh(smooth, color=SURFACE, smooth_shading=True, ambient=0.35, specular=0.0)
-    start, end = _segments(mesh, field)
-    count = len(start)
-    ends = np.stack([np.full(count, 2), np.arange(count), np.arange(count) + count], axis=1)
-    lines = pv.PolyData(np.concatenate([start, end]), lines=ends)
-    plotter.add_mesh(lines, color=CROSS, line_width=1.6, lighting=False)
+    draw_crosses(plotter, pv, mesh, field)
     points = mesh.vertices[singular.vertex]
     _marks(plotter, pv, points, 4 - singular.quarters, mesh.diagonal, INDICES)
 
@@ -121,20 +112,3 @@ def _marks(
             loc="lower left",
             font_family="arial",
         )
-
-
-def _segments(mesh: TriMesh, field: CrossField) -> tuple[Floats, Floats]:
-    """Both lines of a cross at faces spread evenly over the surface; ends (2q, 3) each."""
-    crosses = field if field.domain == "faces" else to_faces(mesh, field)
-    spacing = np.sqrt(mesh.area / CROSSES)
-    centre = mesh.vertices[mesh.faces].mean(axis=1)
-    known = np.flatnonzero((crosses.z != 0) & (mesh.face_areas > 0))
-    cell = np.floor(centre[known] / spacing).astype(np.int64)
-    known = known[np.unique(cell, axis=0, return_index=True)[1]]
-    length = ARM * np.sqrt(mesh.area / max(len(known), 1))
-    axes = face_axes(mesh)
-    u = np.exp(1j * crosses.angle)
-    centre = centre[known] + LIFT * length * mesh.face_normals[known]
-    arms = [length * to_3d(u * turn, axes)[known] for turn in (1.0, 1j)]
-    start = np.concatenate([centre - arm for arm in arms])
-    return start, np.concatenate([centre + arm for arm in arms])
