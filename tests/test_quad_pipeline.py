@@ -112,10 +112,12 @@ def test_tiny_targets(name: str) -> None:
         assert result.quads.n_quads < 80
 
 
-@pytest.mark.xfail(reason="a cube's arcs grow all at once, and the count beats the creases")
-def test_a_count_does_not_cost_the_creases() -> None:
-    result = run(plate_with_holes(2, 2), 300)  # 200 quads or 450 along the creases
+@pytest.mark.parametrize("target", [100, 300, 500])
+def test_a_count_does_not_cost_the_creases(target: int) -> None:
+    """All arcs alike round up at once: 200 quads or 450, if nothing made some of them differ."""
+    result = run(plate_with_holes(2, 2), target)
     assert result.report.components[0].method == MAP
+    assert abs(result.quads.n_quads - target) <= 0.06 * target
 
 
 def test_two_triangles() -> None:

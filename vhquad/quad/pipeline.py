@@ -50,6 +50,7 @@ Bools = NDArray[np.bool_]
 
 LEAST_QUADS = 6
 NEAR_COUNT = 1.10
+SMALL_SHARE = 0.005  # of all quads: so much too many or too few in one component is near enough
 LOOSE_CREASE = 1.5  # quads; shorter creases that end loose are noise
 
 Progress = Callable[[str, float], None]
@@ -280,6 +281,7 @@ def _remesh_parts(
     """Quads of every component by itself; the field has the sizes wanted."""
     size = np.ones(mesh.n_faces) if field.size is None else field.size
     density = mesh.face_areas / size**2
+    slack = SMALL_SHARE * float(density.sum())
     parts: list[Part] = []
     n_parts = mesh.n_components
     for number in range(n_parts):
@@ -309,7 +311,7 @@ def _remesh_parts(
             whole, _ = original.submesh(original.face_component == number)
         surface = ClosestPoints(whole)
         parts.append(
-            _remesh_part(part, part_field, own, edge, angle, target, surface, with_uv, tell)
+            _remesh_part(part, part_field, own, edge, angle, target, slack, surface, with_uv, tell)
         )
     return parts
 
@@ -356,11 +358,15 @@ def _remesh_part(
     seam: Bools | None,
     angle: float | None,
     target: int,
+    slack: float,
     surface: ClosestPoints,
     with_uv: bool,
     tell: Progress,
 ) -> Part:
-    """Quads of one component by the first attempt that gives a valid mesh of about the count."""
+    """Quads of one component by the first attempt that gives a valid mesh of about the count.
+
+    Within ``slack`` quads any count is near enough.
+    """
     watch = _Watch()
     length = float(np.sqrt(mesh.area / target))
     reasons: list[str] = []
@@ -372,12 +378,13 @@ def _remesh_part(
         except (ParametrizationError, FieldError) as problem:
             reasons.append(str(problem))
             continue
-        miss = abs(np.log(mapped.quads.n_quads / target))
+        made = mapped.quads.n_quads
+        miss = abs(np.log(made / target))
         if best is None or miss < best[0]:
             best = (miss, mapped, attempt.name)
-        if miss <= np.log(NEAR_COUNT):
+        if miss <= np.log(NEAR_COUNT) or abs(made - target) <= slack:
             break
-        reasons.append(f"{mapped.quads.n_quads} quads where {target} were asked for")
+        reasons.append(f"{made} quads where {target} were asked for")
     uv: UvMap | None = None
     if best is not None:
         _, mapped, method = best

@@ -4,7 +4,9 @@ Minimise ``sum_a w_a (n_a - s l_a)^2`` over integers ``n_a >= 0`` such that oppo
 patch agree and nothing falls together that must stay apart (Campen, Bommes & Kobbelt 2015; Lyon,
 Campen & Kobbelt 2021). The square is linear between integers, so this is a linear program; its
 solution is almost always half-integral (Heistermann, Warnett & Bommes 2023), and a small integer
-program around it finishes. Conditions of separation are added when they are found violated.
+program around it finishes. Conditions of separation are added when they are found violated. Where
+many arcs would round up all at once and the count jumps past the wanted one, a condition on the
+count itself makes some of them grow.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ from scipy.sparse import coo_matrix, csr_matrix, hstack
 from scipy.sparse.csgraph import connected_components
 
 from vhquad.errors import ParametrizationError
-from vhquad.quad.layout import Layout, build_layout
+from vhquad.quad.layout import Layout, build_layout, side_length
 from vhquad.quad.separation import Condition, loop_conditions, separation_conditions
 from vhquad.quad.tmesh import TMesh
 
@@ -29,6 +31,7 @@ Ints = NDArray[np.int64]
 
 COUNT_TOLERANCE = 0.03  # stop adjusting the scale once the count is this near
 MOST_SCALES = 6
+MOST_BUDGETS = 3
 HOPELESS = np.log(1.5)  # surplus after two tries at which smaller scales are not worth a third
 MOST_ROUNDS = 40
 MOST_DIVES = 60
@@ -43,6 +46,11 @@ class Quantisation:
     scale: float
     conditions: int
     rounds: int
+
+    @property
+    def n_quads(self) -> int:
+        """Quads of the layout."""
+        return len(self.layout.quads)
 
 
 def quantise(tmesh: TMesh, target_quads: float, area: float) -> Quantisation:
@@ -64,37 +72,78 @@ def quantise(tmesh: TMesh, target_quads: float, area: float) -> Quantisation:
     """
     program = _Program(tmesh)
     scale = float(np.sqrt(target_quads / area))
-    best: tuple[float, Quantisation] | None = None
     conditions: dict[Condition, None] = {}
+    results: list[Quantisation] = []
     tried: list[tuple[float, float]] = []
     for _ in range(MOST_SCALES):
-        result = _separated(program, scale, conditions)
-        count = len(result.layout.quads)
-        miss = abs(np.log(count / target_quads))
-        if best is None or miss < best[0]:
-            best = (miss, result)
-        if miss <= np.log1p(COUNT_TOLERANCE):
-            break
-        tried.append((np.log(scale), np.log(count / target_quads)))
+        results.append(_separated(program, scale, conditions))
+        tried.append((np.log(scale), np.log(results[-1].n_quads / target_quads)))
+        if abs(tried[-1][1]) <= np.log1p(COUNT_TOLERANCE):
+            return results[-1]
         if len(tried) == 2 and min(m for _, m in tried) > HOPELESS:
             break  # what must stay apart takes more quads than that
         following = _next_scale(tried)
         if any(abs(following - s) < 1e-3 for s, _ in tried):
             break
         scale = float(np.exp(following))
-    assert best is not None
-    return best[1]
+    results += _between(program, results, target_quads, conditions)
+    return min(results, key=lambda r: abs(np.log(r.n_quads / target_quads)))
+
+
+def _between(
+    program: _Program,
+    results: list[Quantisation],
+    target: float,
+    conditions: dict[Condition, None],
+) -> list[Quantisation]:
+    """More results, from the largest with too few quads: the count is asked for as a condition.
+
+    Between two results the count changes by ``sum_p (h dw + w dh)``, exactly so with the means of
+    the two of each patch's width and height; that is linear in the arc lengths.
+    """
+    fewer = [r for r in results if r.n_quads < target]
+    more = [r for r in results if r.n_quads > target]
+    made: list[Quantisation] = []
+    while fewer and more and len(made) < MOST_BUDGETS:
+        low = max(fewer, key=lambda r: r.n_quads)
+        high = min(more, key=lambda r: r.n_quads)
+        if abs(np.log(low.n_quads / target)) <= np.log1p(COUNT_TOLERANCE):
+            break
+        form = _count_form(program.tmesh, low.layout.lengths + high.layout.lengths)
+        have = sum(factor * int(low.layout.lengths[arc]) for arc, factor in form)
+        # Conditions are whole: everything is counted four times.
+        budget = Condition(form, have + int(4 * (target - low.n_quads)))
+        program.add([budget])
+        try:
+            made.append(_separated(program, low.scale, conditions))
+        except ParametrizationError:
+            break  # the lengths in between are not to be had
+        if not low.n_quads < made[-1].n_quads < high.n_quads:
+            break
+        (fewer if made[-1].n_quads < target else more).append(made[-1])
+    return made
+
+
+def _count_form(tmesh: TMesh, lengths: Ints) -> tuple[tuple[int, int], ...]:
+    """Four times the derivative of the number of quads at half of the lengths, as a form."""
+    factor = np.zeros(len(tmesh.arcs), dtype=np.int64)
+    for patch in tmesh.patches:
+        for i, side in enumerate(patch.sides):
+            across = side_length(lengths, patch.sides[(i + 1) % 4])
+            for half in side:
+                factor[half >> 1] += across
+    return tuple((int(arc), int(factor[arc])) for arc in np.flatnonzero(factor))
 
 
 def _next_scale(tried: list[tuple[float, float]]) -> float:
-    """Log of the next scale: between bracketing tries, else by the slope of two."""
+    """Log of the next scale: between bracketing tries, else beyond the last, ever further."""
     below = [t for t in tried if t[1] < 0]
     above = [t for t in tried if t[1] > 0]
     if below and above:
         (s0, m0), (s1, m1) = max(below, key=lambda t: t[1]), min(above, key=lambda t: t[1])
         return s0 + (s1 - s0) * min(max(-m0 / (m1 - m0), 0.15), 0.85)
-    scale, miss = min(tried, key=lambda t: abs(t[1]))
-    return scale - 0.6 * miss
+    scale, miss = max(tried) if below else min(tried)
+    return scale - 0.6 * miss * 1.5 ** (len(tried) - 1)
 
 
 class _Program:
