@@ -17,6 +17,7 @@ from vhquad.field.cross import CrossField
 from vhquad.field.singular import find_singularities
 from vhquad.geometry.frames import from_3d, vertex_axes
 from vhquad.learn.pairs import is_second_of_pair, quads_beside, read_pair, transfer
+from vhquad.learn.preprocess import PreprocessSettings, preprocess
 from vhquad.mesh.io import write_quad_mesh, write_triangle_mesh
 from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.triangle import TriMesh
@@ -90,6 +91,29 @@ def test_read_pair(tmp_path: Path) -> None:
     mesh, field = read_pair(tmp_path / "ring.obj", tmp_path / "ring_quads.off")
     assert (mesh.n_vertices, len(field)) == (RING.n_vertices, RING.n_vertices)
     assert isinstance(field, CrossField)
+
+
+def test_a_folder_of_pairs_becomes_a_dataset(tmp_path: Path) -> None:
+    """5. One sample a pair, its triangles as they are; what contradicts itself is named."""
+    folder = tmp_path / "in"
+    folder.mkdir()
+    ring = torus(24, 12)
+    for name in ("a", "b"):
+        write_triangle_mesh(folder / f"{name}.obj", ring)
+        write_quad_mesh(folder / f"{name}_quads.obj", own(ring))
+    for name in ("c", "c_quads"):
+        write_quad_mesh(folder / f"{name}.obj", QuadMesh(*quad_torus()))
+    settings = PreprocessSettings(k=16, val=0.0)
+    dataset = preprocess(folder, tmp_path / "out", settings, 1)
+    assert [(e.name, e.variant, e.truth) for e in dataset.samples] == [
+        ("a.t0", "pair", True),
+        ("b.t0", "pair", True),
+    ]
+    np.testing.assert_array_equal(dataset.mesh(dataset.samples[0]).faces, ring.faces)
+    truth = dataset.truth_field(dataset.samples[0])
+    assert truth.size is not None
+    assert (truth.size > 0).all()
+    assert [(name, "so does" in reason) for name, reason in dataset.skipped] == [("c.obj", True)]
 
 
 def test_other_surfaces_are_refused(tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ def preprocess(
         typer.Argument(
             metavar="FOLDER",
             help="Holds quad meshes (OBJ, PLY, OFF), triangle meshes with a field file of the same "
-            "name beside them, or plain triangle meshes; subfolders too.",
+            "name or quads (NAME_quads.obj) beside them, or plain triangle meshes; subfolders too.",
             show_default=False,
         ),
     ],

@@ -3,7 +3,8 @@
 What each file gives:
 
 - a mesh of quads only: samples with ground truth, see ``targets.py``, several a shape;
-- a triangle mesh with a field file of the same stem beside it: one sample with that truth;
+- a triangle mesh with a field file of the same stem beside it, or with the quads that some remesher
+  made of it (``NAME_quads``, see ``pairs.py``): one sample with that truth;
 - any other triangle mesh: one sample without truth; its operators also go to the cache that
   ``predict`` looks into.
 """
@@ -23,6 +24,7 @@ import numpy as np
 
 from vhquad.errors import DatasetError, VhquadError
 from vhquad.learn.dataset import Dataset, SampleEntry, Split, write_index, write_sample
+from vhquad.learn.pairs import is_second_of_pair
 from vhquad.learn.samples import (
     PreprocessSettings,
     make_sample,
@@ -145,7 +147,9 @@ def _jobs(folder: Path, out: Path, settings: PreprocessSettings) -> list[_Job]:
     sources = sorted(
         path
         for path in folder.rglob("*")
-        if path.suffix.lower() in MESH_SUFFIXES and out not in path.parents
+        if path.suffix.lower() in MESH_SUFFIXES
+        and out not in path.parents
+        and not is_second_of_pair(path)
     )
     if not sources:
         raise DatasetError(f"{folder} holds no mesh ({', '.join(MESH_SUFFIXES)})")

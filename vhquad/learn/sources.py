@@ -1,4 +1,4 @@
-"""What a mesh file offers for training: quads, triangles with a field beside them, or triangles."""
+"""What a mesh file offers for training: quads, or triangles, perhaps with a field or quads beside."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from vhquad.errors import MeshError
 from vhquad.field.cross import CrossField
 from vhquad.field.io import read_field
 from vhquad.field.transport import to_vertices
+from vhquad.learn.pairs import quads_beside, read_pair
 from vhquad.mesh.io import read_polygons
 from vhquad.mesh.load import load
 from vhquad.mesh.triangle import TriMesh
@@ -60,6 +61,9 @@ def read_source(path: Path) -> list[Part]:
     """
     soup = read_polygons(path)
     if (soup.sizes == 4).all():
+        quads = quads_beside(path)
+        if quads is not None:
+            raise MeshError(f"it holds quads, and so does {quads.name}; rename one of them")
         return _quad_parts(path, soup.vertices, soup.of_size(4)[0])
     if (soup.sizes == 3).all():
         return [_triangle_part(path, soup.vertices, soup.of_size(3)[0])]
@@ -95,6 +99,12 @@ def _quad_parts(path: Path, vertices: NDArray[np.float64], quads: NDArray[np.int
 
 def _triangle_part(path: Path, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Part:
     beside = [path.with_suffix(s) for s in FIELD_SUFFIXES if path.with_suffix(s).exists()]
+    quads = quads_beside(path)
+    if quads is not None:
+        if beside:
+            raise MeshError(f"{beside[0].name} and {quads.name} lie beside it; keep one of them")
+        mesh, field = read_pair(path, quads)
+        return Part((path, quads), mesh=mesh, field=field)
     if not beside:
         mesh = load(path).mesh
         if mesh.n_components > 1:
