@@ -1,4 +1,4 @@
-"""What a mesh file offers for training: quads, or triangles, perhaps with a field or quads beside."""
+"""What a file offers for training: quads, or triangles, perhaps with a field or quads beside."""
 
 from __future__ import annotations
 
