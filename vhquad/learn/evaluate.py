@@ -40,6 +40,7 @@ from vhquad.learn.singularities import (
     artists,
     singularity_row,
 )
+from vhquad.learn.train import check_fit
 from vhquad.mesh.triangle import TriMesh
 from vhquad.nn.checkpoint import Model, load_model
 from vhquad.picture import check_viz
@@ -152,7 +153,7 @@ def evaluate(
     opened = [open_dataset(path) for path in paths]
     items = _items(opened, split)
     for dataset in opened:
-        _check_fit(chosen, dataset)
+        check_fit(chosen.settings, dataset)
     target = choose_device(device)
     network = chosen.network.to(target)
     found = []
@@ -189,15 +190,6 @@ def _items(datasets: list[Dataset], split: str) -> list[tuple[Dataset, SampleEnt
             f"no sample with ground truth is in the {split} split ({there or 'nor in any other'})"
         )
     return items
-
-
-def _check_fit(model: Model, dataset: Dataset) -> None:
-    for name in ("features", "turned", "k", "in_channels", "order"):
-        if getattr(model.settings, name) != getattr(dataset, name):
-            raise DatasetError(
-                f"the model takes {name} = {getattr(model.settings, name)}, {dataset.folder} was "
-                f"prepared with {getattr(dataset, name)}; preprocess again with the model's"
-            )
 
 
 def _measure(

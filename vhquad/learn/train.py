@@ -21,9 +21,9 @@ from vhquad.learn.schedule import TrainSettings, learning_rate, mirrored, sample
 from vhquad.nn.checkpoint import Model, load_model, save_model
 from vhquad.nn.loss import field_loss
 from vhquad.nn.network import VectorHeatNet
-from vhquad.nn.settings import ModelSettings
+from vhquad.nn.settings import ModelSettings, preset
 
-__all__ = ["TrainResult", "train"]
+__all__ = ["TrainResult", "check_fit", "train"]
 
 Item = tuple[Dataset, SampleEntry]
 SHARED = ("features", "turned", "k", "in_channels", "in_lines", "order")  # of model and datasets
@@ -73,7 +73,7 @@ def train(
     settings : TrainSettings, optional
         With ``resume``, those of the run if not given.
     model : ModelSettings, optional
-        The starter preset if not given; features, k and in_channels are the datasets'.
+        The starter preset if not given; features, their number and k are the datasets'.
     init : path, optional
         Start from the weights of this model ("default": the shipped one) and its settings.
     resume : bool
@@ -111,7 +111,7 @@ def train(
             raise ConfigError(f"{folder} holds a run already; add --resume, or name another folder")
         settings = TrainSettings() if settings is None else settings
         state = RunState.new(_network(opened[0], model, init, settings.seed), settings)
-    _check_fit(state.network.settings, opened[0])
+    check_fit(state.network.settings, opened[0])
     state.to(target)
     log = LossLog(folder / "losses.csv", state.step)
     last: Record | None = None
@@ -162,7 +162,7 @@ def _network(
         if model is not None:
             raise ConfigError("give either a model to start from or a preset, not both")
         return load_model(init).network
-    base = ModelSettings(hidden_layers=1) if model is None else model
+    base = preset("starter") if model is None else model
     chosen = replace(
         base,
         features=dataset.features,
@@ -177,7 +177,13 @@ def _network(
         return VectorHeatNet(chosen)
 
 
-def _check_fit(model: ModelSettings, dataset: Dataset) -> None:
+def check_fit(model: ModelSettings, dataset: Dataset) -> None:
+    """Refuse a dataset that was prepared otherwise than a model needs.
+
+    Raises
+    ------
+    DatasetError
+    """
     for name in SHARED:
         if getattr(model, name) != getattr(dataset, name):
             raise DatasetError(
