@@ -14,7 +14,17 @@ from vhquad.nn.settings import ModelSettings
 
 K = 24
 SETTINGS = PreprocessSettings(vertices=(200, 260), val=0.0, k=K, deform=0.5)
-MODEL = ModelSettings(channels=8, blocks=1, times=2, k=K, hidden_layers=1, head_terms=2)
+MODEL = ModelSettings(
+    in_channels=72,
+    in_lines=6,
+    channels=8,
+    blocks=1,
+    times=2,
+    k=K,
+    hidden_layers=1,
+    head_terms=2,
+    features="local",
+)
 
 
 def quad_torus(

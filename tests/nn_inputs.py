@@ -38,14 +38,18 @@ def random_network(settings: ModelSettings, dtype: torch.dtype = torch.float64) 
     return network.to(dtype).eval()
 
 
+LOCAL: dict[str, object] = {"features": "local", "in_channels": 72, "in_lines": 6}
+"""Settings of a network that takes local features, with lines."""
+
+
 @lru_cache(maxsize=4)
-def blob_operators() -> Operators:
+def blob_operators(features: str = "hks") -> Operators:
     """Operators of a lumpy sphere of 642 vertices without symmetry."""
-    return operators_of(blob(3))
+    return operators_of(blob(3), features)
 
 
-def operators_of(mesh: TriMesh) -> Operators:
-    return build_operators(mesh, OperatorSettings(k=K))
+def operators_of(mesh: TriMesh, features: str = "hks") -> Operators:
+    return build_operators(mesh, OperatorSettings(k=K, features=features))
 
 
 def as_input(operators: Operators, dtype: torch.dtype = torch.float64) -> NetworkInput:
@@ -54,6 +58,7 @@ def as_input(operators: Operators, dtype: torch.dtype = torch.float64) -> Networ
         operators.eigenvalues,
         operators.eigenvectors,
         operators.features,
+        operators.lines,
         dtype=dtype,
         k=K,
     )

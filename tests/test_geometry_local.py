@@ -35,8 +35,13 @@ def in_space(mesh: TriMesh, vectors: Complexes) -> NDArray[np.float64]:
 
 
 def test_a_sphere_is_the_same_everywhere() -> None:
-    """1. No gradients, no lines."""
-    found = curvature_of(meshes.icosphere(4), 0.1, 0.3)
+    """1. Its curvatures in units of the radii, no gradients, no lines."""
+    radii = np.array([0.2, 0.6])
+    found = curvature_of(meshes.icosphere(4, 2.0), *radii)
+    np.testing.assert_allclose(
+        found.gaussian, np.tile(radii**2 / 4.0, (len(found.mean), 1)), rtol=0.02
+    )
+    np.testing.assert_allclose(found.mean, np.tile(radii / 2.0, (len(found.mean), 1)), rtol=0.02)
     assert np.abs(found.mean_slope).max() < 2e-3
     assert np.abs(found.gaussian_slope).max() < 2e-3
     assert np.abs(found.line).max() < 5e-3
@@ -55,7 +60,7 @@ def test_lines_of_a_cylinder() -> None:
 
 
 def test_slopes_of_a_torus() -> None:
-    """3. K = cos v / (a (R + a cos v)) and H = (1 / a + cos v / (R + a cos v)) / 2 by arc length."""
+    """3. K = cos v / (a (R + a cos v)), H = (1 / a + cos v / (R + a cos v)) / 2, by arc length."""
     major, minor, radius = 1.0, 0.4, 0.06
     mesh = meshes.torus(160, 80, major, minor)
     found = curvature_of(mesh, radius)
@@ -63,22 +68,23 @@ def test_slopes_of_a_torus() -> None:
     ring = np.linalg.norm(p[:, :2], axis=1)
     v = np.arctan2(p[:, 2], ring - major)
     along = np.stack([-np.sin(v) * p[:, 0] / ring, -np.sin(v) * p[:, 1] / ring, np.cos(v)], axis=1)
-    slope = -major * np.sin(v) / (minor * ring**2)  # dH/dv * 2 and dK/dv * minor
+    # d/dv of cos v / (R + a cos v) is -R sin v / (R + a cos v)^2; an arc is a dv long.
+    slope = (-major * np.sin(v) / ring**2 / minor)[:, None] * along
+    steepest = np.linalg.norm(slope, axis=1).max()
     gaussian = in_space(mesh, found.gaussian_slope[:, 0]) / radius**3
     mean = in_space(mesh, found.mean_slope[:, 0]) / radius**2
-    scale = np.abs(slope / minor).max()
-    exact = (slope / minor)[:, None] * along
-    np.testing.assert_allclose(gaussian, exact / minor * minor, atol=0.1 * scale)
-    np.testing.assert_allclose(mean, 0.5 * exact * minor, atol=0.1 * 0.5 * scale * minor)
+    np.testing.assert_allclose(gaussian * minor, slope, atol=0.1 * steepest)
+    np.testing.assert_allclose(mean * 2.0, slope, atol=0.1 * steepest)
     # Smoothing flattens: never steeper than the truth by more than the mesh's error.
-    assert np.linalg.norm(mean, axis=1).max() < 1.02 * 0.5 * scale * minor
+    assert np.linalg.norm(mean * 2.0, axis=1).max() < 1.02 * steepest
 
 
 def test_reflection_at_the_lines() -> None:
-    """4. The second half holds the gradients reflected: the same length ratio, twice the angle."""
+    """4. The second third holds the gradients reflected, the last one the gradients lengthened."""
     found = curvature_of(meshes.blob(3), *np.full(6, 0.2))
     x = local_vectors(found)
-    assert x.shape[1] == 24
+    assert x.shape[1] == 36
+    np.testing.assert_allclose((x[:, 24:] * x[:, :12].conj()).imag, 0.0, atol=1e-12)
     turned = x[:, 6:12] * x[:, 18:24]  # v times q conj(v) has the direction of q
     cosine = (turned * found.line.conj()).real / np.abs(turned * found.line)
     np.testing.assert_allclose(cosine, 1.0, atol=1e-9)
@@ -109,5 +115,5 @@ def crop_change(name: str, mesh: TriMesh) -> float:
 def test_a_crop_far_away_matters_little(head: TriMesh) -> None:
     """5. The heat kernel signature turns into something else, local features hardly change."""
     local, global_ = crop_change("local", head), crop_change("hks", head)
-    assert local < 0.35, (local, global_)
+    assert local < 0.4, (local, global_)
     assert global_ > 2.0 * local, (local, global_)

@@ -31,7 +31,8 @@ def test_quads_become_samples(tmp_path: Path) -> None:
     dataset = open_dataset(tmp_path / "out")
     assert [e.name for e in dataset.samples] == ["ring0.t0", "ring0.t1", "ring1.t0", "ring1.t1"]
     assert {e.shape for e in dataset.split("test")} == {"ring1"}
-    assert (dataset.k, dataset.in_channels, dataset.features) == (K, 30, "hks")
+    assert (dataset.k, dataset.features) == (K, "local")
+    assert (dataset.in_channels, dataset.in_lines) == (72, 6)
     assert dataset.samples[0].variant == "whole"
     for entry in dataset.samples:
         sample, mesh = dataset.load(entry), dataset.mesh(entry)
@@ -171,18 +172,19 @@ def test_damaged_indices_are_refused(tmp_path: Path) -> None:
     index = tmp_path / "index.json"
     good = {
         "format": "vhquad-dataset",
-        "version": 1,
+        "version": 2,
         "features": "hks",
         "turned": True,
         "k": 8,
         "in_channels": 30,
+        "in_lines": 0,
         "order": 4,
         "skipped": [],
         "samples": [],
     }
     assert _written(index, good) is None
     assert "not the index" in str(_written(index, {**good, "format": "x"}))
-    assert "version 2" in str(_written(index, {**good, "version": 2}))
+    assert "version 1" in str(_written(index, {**good, "version": 1}))
     assert "damaged" in str(_written(index, {**good, "samples": [{"name": "a"}]}))
     entry = {
         "name": "../../a",

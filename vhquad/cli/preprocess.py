@@ -57,6 +57,9 @@ def preprocess(
     deform: Annotated[
         float, typer.Option("--deform", help="Share of the further samples that are deformed.")
     ] = 0.0,
+    rough: Annotated[
+        float, typer.Option("--rough", help="Share of the further samples with a scan's noise.")
+    ] = 0.2,
     val: Annotated[
         float, typer.Option("--val", help="Share of the shapes kept for validation.")
     ] = 0.1,
@@ -64,8 +67,8 @@ def preprocess(
         float, typer.Option("--test", help="Share of the shapes kept for testing.")
     ] = 0.0,
     features: Annotated[
-        str, typer.Option("--features", help="Input features: hks, gaussian, mean or pcd.")
-    ] = "hks",
+        str, typer.Option("--features", help="Input features: local, hks, gaussian, mean or pcd.")
+    ] = "local",
     k: Annotated[int, typer.Option("--k", help="Eigenvectors.")] = 128,
     seed: Annotated[int, typer.Option("--seed", help="Of all random choices.")] = 0,
 ) -> None:
@@ -86,6 +89,7 @@ def preprocess(
             vertices=vertices,
             crops=crops,
             deform=deform,
+            rough=rough,
             val=val,
             test=test,
             features=features,

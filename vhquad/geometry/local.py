@@ -6,8 +6,9 @@ diffusion each (one step smooths too little for a gradient to be taken). What li
 the radius hardly counts, so that a shape looks the same after a part of it was cut off, up to the
 unit: radii are shares of the square root of the area.
 
-Tangent vectors: the gradients of the Gaussian and of the mean curvature, and the same gradients
-reflected at the principal lines. Lines: the deviatoric shape operator. Values are in units of their
+Tangent vectors: the gradients of the Gaussian and of the mean curvature, the same gradients
+reflected at the principal lines, and the same multiplied by the curvatures themselves, which tell
+ridges from valleys. Lines: the deviatoric shape operator. Values are in units of their
 radius, so that they have no unit, divided by a typical value and compressed: the longer, the more,
 but no longer than the logarithm of what they were. Unlike the heat kernel and the Gaussian
 curvature, mean curvature and lines know how the surface lies in space: these features follow rigid
@@ -43,6 +44,8 @@ Complexes = NDArray[np.complex128]
 RADII = np.array([0.02, 0.032, 0.05, 0.08, 0.125, 0.2])
 """Radii of the neighbourhoods in square roots of the area (a head's mouth is about 0.1)."""
 
+GAUSSIAN = np.array([0.02, 0.04, 0.075, 0.135, 0.23, 0.37])
+MEAN = np.array([0.09, 0.13, 0.19, 0.28, 0.37, 0.50])
 GAUSSIAN_SLOPE = np.array([0.014, 0.033, 0.064, 0.12, 0.22, 0.36])
 MEAN_SLOPE = np.array([0.029, 0.043, 0.062, 0.091, 0.14, 0.20])
 LINE = 0.075
@@ -57,6 +60,10 @@ class LocalCurvature:
 
     Attributes
     ----------
+    gaussian : (n, r) float64
+        Gaussian curvature times radius^2.
+    mean : (n, r) float64
+        Mean curvature times the radius, positive where convex.
     gaussian_slope : (n, r) complex128
         Gradient of the Gaussian curvature times radius^3.
     mean_slope : (n, r) complex128
@@ -65,6 +72,8 @@ class LocalCurvature:
         ``(k1 - k2) / 2 exp(2i a)`` times the radius, a the angle of the direction of k1.
     """
 
+    gaussian: Floats
+    mean: Floats
     gaussian_slope: Complexes
     mean_slope: Complexes
     line: Complexes
@@ -99,25 +108,31 @@ def local_curvature(
     numbers = np.stack([bends, mass, angle_defect(mesh, frames), inside], axis=1) / mass[:, None]
     scalar, lines = cotan_laplacian(tri), connection_laplacian(tri, order=2)
     gradient = gradient_operator(tri)
-    slopes: tuple[list[Complexes], list[Complexes], list[Complexes]] = ([], [], [])
+    found: tuple[list[NDArray], ...] = ([], [], [], [], [])
     for radius in radii:
         near = _smoother(scalar, mass, radius**2)(numbers)
+        mean = near[:, 0] / near[:, 1]
         gaussian = np.divide(near[:, 2], near[:, 3], out=np.zeros(n), where=near[:, 3] > 1e-12)
-        slopes[0].append(radius**3 * (gradient @ gaussian))
-        slopes[1].append(radius**2 * (gradient @ (near[:, 0] / near[:, 1])))
-        slopes[2].append(radius * _smoother(lines, mass, radius**2)(line / mass) / near[:, 1])
-    return LocalCurvature(*(np.stack(part, axis=1) for part in slopes))
+        found[0].append(radius**2 * gaussian)
+        found[1].append(radius * mean)
+        found[2].append(radius**3 * (gradient @ gaussian))
+        found[3].append(radius**2 * (gradient @ mean))
+        found[4].append(radius * _smoother(lines, mass, radius**2)(line / mass) / near[:, 1])
+    return LocalCurvature(*(np.stack(part, axis=1) for part in found))
 
 
 def local_vectors(curvature: LocalCurvature) -> Complexes:
-    """Tangent vectors of the network's input; (n, 4 r) complex128.
+    """Tangent vectors of the network's input; (n, 6 r) complex128.
 
-    The two gradients, then both reflected at the lines (times the lines' strength).
+    The two gradients, both reflected at the lines (times the lines' strength), and both times the
+    curvature that they are of (mean curvature: times what it is above the typical).
     """
     q = curvature.line / LINE
     slopes = curvature.gaussian_slope / GAUSSIAN_SLOPE, curvature.mean_slope / MEAN_SLOPE
-    reflected = (q * s.conj() / np.sqrt(1.0 + np.abs(s) ** 2) for s in slopes)
-    return np.hstack([_compressed(part) for part in (*slopes, *reflected)])
+    plain = [_compressed(slope) for slope in slopes]
+    reflected = [_compressed(q * s.conj() / np.sqrt(1.0 + np.abs(s) ** 2)) for s in slopes]
+    level = np.arcsinh(curvature.gaussian / GAUSSIAN), np.arcsinh(curvature.mean / MEAN) - 1.0
+    return np.hstack([*plain, *reflected, *(v * t for v, t in zip(plain, level, strict=True))])
 
 
 def local_lines(curvature: LocalCurvature) -> Complexes:

@@ -163,7 +163,8 @@ class Dataset:
         arrays = _read(
             self.folder, entry, (*wanted, "z", "size", "coherence") if entry.truth else wanted
         )
-        mesh = network_input(*(arrays[name] for name in wanted), dtype=dtype, k=self.k)
+        mass, values, vectors, features, lines = (arrays[name] for name in wanted)
+        mesh = network_input(mass, values, vectors, features, lines, dtype=dtype, k=self.k)
         truth = None
         if entry.truth:
             truth = FieldTruth(

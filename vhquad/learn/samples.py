@@ -63,7 +63,7 @@ class PreprocessSettings:
     rough: float = 0.2
     val: float = 0.1
     test: float = 0.0
-    features: str = "hks"
+    features: str = "local"
     turned: bool = True
     k: int = 128
     seed: int = 0
