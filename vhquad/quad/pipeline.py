@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vhquad.errors import ConfigError, FieldError, ParametrizationError
 from vhquad.field.align import AlignedField, AlignSettings, align_field
+from vhquad.field.bridge import bridge_gaps
 from vhquad.field.cross import CrossField
 from vhquad.field.density import bend_to_density
 from vhquad.field.features import find_creases
@@ -51,6 +52,7 @@ Bools = NDArray[np.bool_]
 LEAST_QUADS = 6
 NEAR_COUNT = 1.10
 SMALL_SHARE = 0.005  # of all quads: so much too many or too few in one component is near enough
+CREASE_GAP = 0.75  # quads; creases that end so near others go on to them
 LOOSE_CREASE = 1.5  # quads; shorter creases that end loose are noise
 
 Progress = Callable[[str, float], None]
@@ -339,6 +341,7 @@ class _Attempt:
         if angle is None:
             return np.zeros((0, 2), dtype=np.int64)
         found = find_creases(mesh, angle, self.crease_length * length)
+        found = bridge_gaps(mesh, found, CREASE_GAP * length)
         return prune_branches(mesh, found, LOOSE_CREASE * length)
 
 
@@ -455,7 +458,7 @@ def _by_map(
     tell("polish", 0.75)
     with watch("polish"):
         fixed, curves = _constraints(layout)
-        vertices = smooth_quads(vertices, layout.quads, surface, fixed, curves)
+        vertices = smooth_quads(vertices, layout.quads, surface, fixed, curves, loosen=True)
     return _Mapped(QuadMesh(vertices, layout.quads), aligned, seamless, tracing, layout)
 
 
