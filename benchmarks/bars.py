@@ -87,13 +87,25 @@ def no_fallback(run: Result) -> bool:
 
 
 def extra_irregular(run: Result) -> float:
-    """By how much the interior irregular vertices off creases differ from the singularities."""
+    """Interior irregular vertices too many or too few for the singularities of the field.
+
+    Exact where the input has no sharp edges. Where creases are kept, their corners are irregular
+    vertices but no singularities; which of the sharp edges were kept the judge does not know, so
+    there the singularities must be all of those off sharp edges, and among those inside.
+    """
     figures = figures_of(run)
-    found = dict(figures.get("irregular_off_creases", figures["irregular"]))
+    inside = figures["irregular"]
+    off = figures.get("irregular_off_creases", inside)
+    field: dict[str, int] = {}
     for part in run["parts"]:
         for quads, count in part["singularities"].items():
-            found[quads] = found.get(quads, 0) - count
-    return float(sum(abs(n) for n in found.values()))
+            field[quads] = field.get(quads, 0) + count
+    return float(
+        sum(
+            max(off.get(v, 0) - field.get(v, 0), field.get(v, 0) - inside.get(v, 0), 0)
+            for v in {*inside, *field}
+        )
+    )
 
 
 def count_off(run: Result) -> float:
