@@ -35,9 +35,13 @@ def dihedral_angles(mesh: TriMesh) -> Floats:
 
 def sharp_edges(mesh: TriMesh, degrees: float) -> Ints:
     """All edges sharper than an angle; (k,) edge indices."""
+    return _above(dihedral_angles(mesh), degrees)
+
+
+def _above(angles: Floats, degrees: float) -> Ints:
     if not 0.0 < degrees <= 180.0:
         raise ConfigError(f"a crease angle lies between 0 and 180 degrees, not at {degrees}")
-    return np.flatnonzero(dihedral_angles(mesh) > np.radians(degrees))
+    return np.flatnonzero(angles > np.radians(degrees))
 
 
 def find_creases(mesh: TriMesh, degrees: float = 40.0, shortest: float = 0.0) -> Ints:
@@ -58,9 +62,9 @@ def find_creases(mesh: TriMesh, degrees: float = 40.0, shortest: float = 0.0) ->
     (k, 2) int64
         Vertex pairs (lower, higher), sorted.
     """
-    edges = sharp_edges(mesh, degrees)
-    angle = dihedral_angles(mesh)[edges]
-    edges = edges[is_sudden(mesh, edges, angle, 0.85 * np.radians(degrees))]
+    angles = dihedral_angles(mesh)
+    edges = _above(angles, degrees)
+    edges = edges[is_sudden(mesh, edges, angles[edges], 0.85 * np.radians(degrees))]
     return drop_short_creases(mesh, mesh.edges[edges], shortest)
 
 

@@ -1,9 +1,10 @@
 """StandIn: a decimated copy that is remeshed in place of a mesh far finer than its quads.
 
-A map needs some ten triangles a quad; a scan has hundreds. The copy keeps what the quads must meet
-exactly, the vertices of borders and creases, and one vertex in every cell of a grid as fine as the
-quads, so that no triangle outgrows them. The rest goes by quadric error. The quads are polished on
-the original surface in the end, and judged against it.
+A map needs some ten triangles a quad; a scan has hundreds. The copy keeps what the quads must
+meet exactly, the vertices of borders and creases, and one vertex in every cell of a grid as fine as
+the quads, so that no triangle outgrows them. The rest goes by quadric error, and edges are flipped
+until triangles are shapely. The quads are polished on the original surface in the end, and judged
+against it.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from scipy.spatial import cKDTree
 from vhquad.field.features import find_creases
 from vhquad.field.prune import prune_branches
 from vhquad.mesh.closest import ClosestPoints
+from vhquad.mesh.flips import flip_edges
 from vhquad.mesh.triangle import TriMesh
 
 __all__ = ["StandIn", "make_stand_in"]
@@ -26,11 +28,15 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-FACES_A_QUAD = 12
-FEWEST_FACES = 30_000  # below this there is little to gain
+FACES_A_QUAD = 10
+FEWEST_FACES = 50_000  # below this there is little to gain
 WORTH_FROM = 2.0  # times as many faces must there be
 CELL = 0.8  # of the grid, in quad edges
 ATTEMPTS, AROUND = 5, 40  # rounds of keeping so many more vertices around each unsound place
+RELAXING_ROUNDS, UNDOING_ROUNDS = 2, 5
+MOST_SLIVERS = 1e-4  # of the faces
+LEAST_COSINE = 0.3  # between a face's normals before and after its corners have moved
+SLIVER = 1e-3  # of a triangle's area over its longest side squared
 CREASE_LENGTH, LOOSE_CREASE = 2.5, 1.5  # quad edges; as for meshes without a stand-in
 
 
@@ -103,8 +109,13 @@ def make_stand_in(
         faces.append(small.faces + start)
         start += small.n_vertices
     copy = TriMesh(np.concatenate(vertices), np.concatenate(faces))
-    worth = copy.n_faces * WORTH_FROM <= mesh.n_faces
-    return StandIn(copy, place[creases], mesh) if worth else None
+    if copy.n_faces * WORTH_FROM > mesh.n_faces:
+        return None
+    lines = place[creases]
+    bound = np.zeros(copy.n_vertices, dtype=bool)
+    bound[place[feature & (place >= 0)]] = True
+    copy = _relaxed(copy, ~bound, lines, ClosestPoints(mesh))
+    return None if _slim(copy).mean() > MOST_SLIVERS else StandIn(copy, lines, mesh)
 
 
 def _decimated(
@@ -122,7 +133,7 @@ def _decimated(
     wanted = _topology(piece)
     for _ in range(ATTEMPTS):
         points, faces, where = _collapsed(piece, locked, n_faces)
-        bad = _unsound(points, faces)
+        bad = _unsound(points, faces, where[where >= 0])
         if not bad.any():
             small = TriMesh(points, faces)
             return (small if _topology(small) == wanted else None), where
@@ -158,8 +169,11 @@ def _collapsed(piece: TriMesh, locked: Bools, n_faces: int) -> tuple[Floats, Int
     return new, faces, where
 
 
-def _unsound(points: Floats, faces: Ints) -> Bools:
-    """Vertices at edges that are not manifold, of several fans, or of faces without area."""
+def _unsound(points: Floats, faces: Ints, held: Ints) -> Bools:
+    """Vertices at edges that are not manifold, of several fans, or of slivers that cannot be cured.
+
+    Those are slivers between three held vertices: their corners will not move.
+    """
     bad = np.zeros(len(points), dtype=bool)
     tail, head = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
     _, edge, count = np.unique(
@@ -168,10 +182,52 @@ def _unsound(points: Floats, faces: Ints) -> Bools:
     twice = count[edge] > 1  # more than two faces, or two of unlike orientation
     bad[tail[twice]] = bad[head[twice]] = True
     mesh = TriMesh(points, faces)
-    bad[faces[mesh.face_areas <= 0]] = True
+    stays = np.zeros(len(points), dtype=bool)
+    stays[held] = True
+    bad[faces[_slim(mesh) & stays[faces].all(axis=1)]] = True
     if not bad.any():
         bad[mesh.tail[mesh.fan_rank < 0]] = True
     return bad
+
+
+def _relaxed(copy: TriMesh, free: Bools, lines: Ints, surface: ClosestPoints) -> TriMesh:
+    """Triangles made shapely: edges flipped, free vertices moved among their neighbours, in turn.
+
+    Decimation leaves slivers, and now and then a vertex on top of another.
+    """
+    for _ in range(RELAXING_ROUNDS):
+        copy = flip_edges(copy, lines)
+        tail, head = np.concatenate([copy.edges, copy.edges[:, ::-1]]).T
+        valence = np.bincount(tail, minlength=copy.n_vertices)[:, None]
+        total = [np.bincount(tail, copy.vertices[head, k], copy.n_vertices) for k in range(3)]
+        middle = np.stack(total, axis=1) / valence
+        moved = np.array(copy.vertices)
+        moved[free] = surface.query(middle[free]).point
+        before = np.array(copy.face_normals)
+        doubtful = _around(copy, _slim(copy))
+        beneath = surface.query(copy.vertices[copy.faces[doubtful]].mean(axis=1)).face
+        before[doubtful] = surface.mesh.face_normals[beneath]
+        for _ in range(UNDOING_ROUNDS):
+            now = TriMesh(moved, copy.faces).face_normals
+            turned = np.einsum("fi,fi->f", now, before) < LEAST_COSINE
+            if not turned.any():
+                break
+            back = np.unique(copy.faces[turned])
+            moved[back] = copy.vertices[back]
+        copy = TriMesh(moved, copy.faces)
+    return flip_edges(copy, lines)
+
+
+def _around(mesh: TriMesh, core: Bools) -> Ints:
+    """Faces that share a vertex with some faces."""
+    touched = np.zeros(mesh.n_vertices, dtype=bool)
+    touched[mesh.faces[core]] = True
+    return np.flatnonzero(touched[mesh.faces].any(axis=1))
+
+
+def _slim(mesh: TriMesh) -> Bools:
+    """Triangles so slim that their normal says little; (m,)."""
+    return np.asarray(mesh.face_areas < SLIVER * mesh.edge_lengths.max(axis=1) ** 2)
 
 
 def _one_a_cell(points: Floats, cell: float) -> Ints:
