@@ -18,6 +18,7 @@ import argparse
 import json
 import os
 import resource
+import signal
 import subprocess
 import sys
 import tempfile
@@ -75,7 +76,8 @@ def one(tool: str, mesh: Path, target: int, limit: int, folder: Path) -> Result:
     result = run(command(tool, mesh, target, out, report), limit, log, cache)
     if not out.exists() or result["exit"] != 0:
         last = log.read_text(errors="replace").strip().splitlines()[-1:]
-        what = f"over {limit} s" if float(str(result["cpu"])) >= limit else f"exit {result['exit']}"
+        slow = result["exit"] in (-signal.SIGXCPU, -signal.SIGKILL)
+        what = f"over {limit} s of CPU" if slow else f"exit {result['exit']}"
         result["error"] = ": ".join([what, *last])[:300]
     if not out.exists():
         return result
