@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -15,8 +17,9 @@ from vhquad.quad.stand_in import StandIn, make_stand_in
 
 
 @pytest.fixture(autouse=True)
-def _small(monkeypatch: pytest.MonkeyPatch) -> None:
+def _small(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(stand_in, "FEWEST_FACES", 3000)
+    monkeypatch.setenv("VHQUAD_CACHE", str(tmp_path))
 
 
 def made(mesh: TriMesh, n_quads: int = 200, angle: float | None = 40.0) -> StandIn:
@@ -93,6 +96,34 @@ def test_coarse_meshes_serve_themselves() -> None:
     assert make_stand_in(meshes.icosphere(6), 5000, angle=40.0) is None
 
 
+def test_kept_ones_serve_other_counts_and_are_never_trusted_if_damaged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cube = meshes.cube(40)
+    first = make_stand_in(cube, 300, angle=40.0, cache=True)
+    assert first is not None
+    (entry,) = tmp_path.glob("stand-in-*.npz")
+    whole = entry.read_bytes()
+
+    def never(*args: object) -> None:
+        raise AssertionError("made again")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(stand_in, "thin_out", never)
+        second = make_stand_in(cube, 200, angle=40.0, cache=True)
+        assert second is not None
+        assert np.array_equal(first.mesh.vertices, second.mesh.vertices)
+        assert np.array_equal(first.creases, second.creases)
+        with pytest.raises(AssertionError, match="made again"):
+            make_stand_in(cube, 200, angle=50.0, cache=True)
+    for damaged in (whole[: len(whole) // 2], b"", whole[:1000] + b"x" * 64 + whole[1064:]):
+        entry.write_bytes(damaged)
+        again = make_stand_in(cube, 300, angle=40.0, cache=True)
+        assert again is not None
+        assert np.array_equal(first.mesh.faces, again.mesh.faces)
+        assert entry.read_bytes() == whole
+
+
 def test_values_are_carried() -> None:
     ball = meshes.icosphere(6)
     found = made(ball)
@@ -124,8 +155,8 @@ def test_quads_lie_on_the_original_and_end_at_its_border() -> None:
 def test_no_stand_in_where_the_mesh_itself_is_wanted(
     why: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    mesh = meshes.icosphere(5)
-    monkeypatch.setattr(stand_in, "FEWEST_FACES", 2000)
+    mesh = meshes.icosphere(4)
+    monkeypatch.setattr(stand_in, "FEWEST_FACES", 1000)
     made = api.remesh_predicted(
         mesh,
         lambda surface: api.predict(surface, method="curvature"),
@@ -140,7 +171,8 @@ def test_no_stand_in_where_the_mesh_itself_is_wanted(
 def test_what_cannot_be_mapped_on_a_stand_in_is_done_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    mesh = meshes.icosphere(6)
+    mesh = meshes.icosphere(4)
+    monkeypatch.setattr(stand_in, "FEWEST_FACES", 1000)
     monkeypatch.setattr(api, "GUESSED_QUADS", 20)  # the field asks for far more
     field_sizes = []
 

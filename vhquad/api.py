@@ -80,7 +80,8 @@ def predict(
     device : str
         For the network: "auto", "cpu", "cuda" ...
     cache : bool
-        Keep the operators of the mesh, and use those kept.
+        Keep the operators of the mesh and its field, and use those kept. Fields of a model that is
+        given as an object are not kept.
     progress : callable, optional
         Called with (what runs, share done).
 
@@ -101,15 +102,25 @@ def predict(
         if model is not None:
             raise ConfigError("a model was given, but the method curvature uses none")
         return curvature_field(mesh)
-    from vhquad.learn.blend import lean_on_curvature
-    from vhquad.learn.predict import predict_field
 
     def on_component(done: int, count: int) -> None:
         if progress is not None:
             progress("predicting the field", done / count)
 
-    field = predict_field(mesh, model, resolution, device, cache=cache, on_component=on_component)
-    return lean_on_curvature(mesh, field)
+    def make() -> CrossField:
+        from vhquad.learn.blend import lean_on_curvature
+        from vhquad.learn.predict import predict_field
+
+        field = predict_field(
+            mesh, model, resolution, device, cache=cache, on_component=on_component
+        )
+        return lean_on_curvature(mesh, field)
+
+    if not cache or not (model is None or isinstance(model, str | Path)):
+        return make()
+    from vhquad.learn.kept import kept_field
+
+    return kept_field(mesh, model, f"{resolution} {device}", make)
 
 
 def remesh(
@@ -235,6 +246,7 @@ def remesh_predicted(
     creases: ArrayLike | None = None,
     density: ArrayLike | None = None,
     stand_in: bool = True,
+    cache: bool = True,
     with_uv: bool = False,
     repair_lines: Sequence[str] = (),
     seconds: Mapping[str, float] | None = None,
@@ -250,6 +262,8 @@ def remesh_predicted(
     stand_in : bool
         Whether a decimated copy may take the place of the mesh. It never does where the map was
         asked for or a symmetry, and if no map is found on it, all is done again on the mesh.
+    cache : bool
+        Keep the stand-in, and use one that was kept.
 
     Other parameters are those of :func:`remesh_with`.
     """
@@ -264,7 +278,7 @@ def remesh_predicted(
     copy: StandIn | None = None
     if stand_in and not with_uv and settings.symmetry == "off":
         with clock(spent, "stand-in"):
-            copy = make_stand_in(mesh, guess, given, settings.crease)
+            copy = make_stand_in(mesh, guess, given, settings.crease, cache)
     if copy is not None:
         with clock(spent, "field"):
             cross = field_of(copy.mesh)

@@ -43,7 +43,7 @@ FullResolution = Annotated[
     ),
 ]
 NoCache = Annotated[
-    bool, typer.Option("--no-cache", help="Neither use nor keep operators in the cache folder.")
+    bool, typer.Option("--no-cache", help="Neither use nor keep anything in the cache folder.")
 ]
 JsonFile = Annotated[
     Path | None,

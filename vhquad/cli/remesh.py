@@ -253,6 +253,7 @@ def remesh(
                 creases=creases,
                 density=factor,
                 stand_in=not full_resolution,
+                cache=not no_cache,
                 with_uv=uv_out is not None,
                 repair_lines=loaded.lines(),
                 seconds=seconds,

@@ -14,6 +14,8 @@ __all__ = ["CrossField", "Domain"]
 
 Domain = Literal["vertices", "faces"]
 
+ROUNDING = 1e-15  # of a modulus of 1
+
 
 @dataclass(frozen=True, eq=False)
 class CrossField:
@@ -45,7 +47,9 @@ class CrossField:
             bad = np.flatnonzero(~np.isfinite(z))
             raise FieldError(f"{len(bad)} crosses are NaN or infinite, the first at {bad[0]}")
         modulus = np.abs(z)
-        z = np.divide(z, modulus, out=np.zeros_like(z), where=modulus > 0)
+        # What is unit already stays to the bit, so that a field written and read again is the same.
+        off = np.abs(modulus - 1.0) > ROUNDING
+        z = np.divide(z, modulus, out=np.where(off, 0.0, z), where=off & (modulus > 0))
         object.__setattr__(self, "z", z)
         for name in ("size", "confidence"):
             value = getattr(self, name)

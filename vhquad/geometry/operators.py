@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
-import sys
-import zipfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vhquad.atomic import atomic_path
+from vhquad.cache import content_key, default_cache_dir, read_arrays, write_arrays
 from vhquad.errors import ConfigError, MeshError
 from vhquad.geometry.delaunay import intrinsic_delaunay
 from vhquad.geometry.features import FEATURES, ShapeContext, compute_features
@@ -141,19 +137,6 @@ def build_operators(mesh: TriMesh, settings: OperatorSettings | None = None) -> 
 # ---- cache -----------------------------------------------------------------------------------
 
 
-def default_cache_dir() -> Path:
-    """``VHQUAD_CACHE`` if set, else ``vhquad`` in the system's cache folder of the user."""
-    if chosen := os.environ.get("VHQUAD_CACHE"):
-        return Path(chosen).expanduser()
-    if sys.platform == "win32":
-        base = os.environ.get("LOCALAPPDATA", "~/AppData/Local")
-    elif sys.platform == "darwin":
-        base = "~/Library/Caches"
-    else:
-        base = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
-    return Path(base).expanduser() / "vhquad"
-
-
 def load_or_build(
     mesh: TriMesh,
     settings: OperatorSettings | None = None,
@@ -183,26 +166,20 @@ def load_or_build(
     if found is not None:
         return found
     built = build_operators(mesh, settings)
-    _write(path, built)
+    write_arrays(path, {name: getattr(built, name) for name in _ARRAYS})
     return built
 
 
 def _key(mesh: TriMesh, settings: OperatorSettings) -> str:
-    digest = hashlib.sha256()
-    digest.update(json.dumps([OPERATORS_VERSION, asdict(settings)], sort_keys=True).encode())
-    for array in (mesh.vertices, mesh.faces):
-        digest.update(str(array.shape).encode())
-        digest.update(np.ascontiguousarray(array).tobytes())
-    return digest.hexdigest()[:40]
+    return content_key([OPERATORS_VERSION, asdict(settings)], mesh.vertices, mesh.faces)
 
 
 def _read(path: Path, mesh: TriMesh, settings: OperatorSettings) -> Operators | None:
     """The entry at a path, or None if it is absent, damaged, or of the wrong shape."""
-    try:
-        with open(path, "rb") as handle, np.load(handle, allow_pickle=False) as data:
-            mass, values, vectors, features, lines = (data[name] for name in _ARRAYS)
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+    found = read_arrays(path, _ARRAYS)
+    if found is None:
         return None
+    mass, values, vectors, features, lines = found
     n = mesh.n_vertices
     pairs = min(settings.k, n)
     fits = (
@@ -213,14 +190,5 @@ def _read(path: Path, mesh: TriMesh, settings: OperatorSettings) -> Operators | 
         and len(features) == len(lines) == n
         and mass.dtype == values.dtype == np.float64
         and vectors.dtype == features.dtype == lines.dtype == np.complex128
-        and all(np.isfinite(a).all() for a in (mass, values, vectors, features, lines))
     )
     return Operators(mesh, settings, mass, values, vectors, features, lines) if fits else None
-
-
-def _write(path: Path, operators: Operators) -> None:
-    try:
-        with atomic_path(path) as temporary:
-            np.savez(temporary, **{name: getattr(operators, name) for name in _ARRAYS})
-    except OSError:
-        return

@@ -49,7 +49,7 @@ def flip_edges(mesh: TriMesh, keep: Ints) -> TriMesh:
         some = np.flatnonzero(
             (np.einsum("ei,ei->e", normal[h // 3], normal[g // 3]) > FLAT)
             & ~_among(_keys(a, b, n), kept)
-            & ~_among(_keys(c, d, n), _keys(*part.edges.T, n))
+            & ~_among(_keys(c, d, n), _keys(part.edges[:, 0], part.edges[:, 1], n))
             & _faces_up(mesh.vertices[np.stack([a, d, c], axis=1)], mean)
             & _faces_up(mesh.vertices[np.stack([d, b, c], axis=1)], mean)
         )

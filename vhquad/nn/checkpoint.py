@@ -18,6 +18,7 @@ from safetensors.torch import save as save_tensors
 
 from vhquad.atomic import write_atomic
 from vhquad.errors import ConfigError, ModelError
+from vhquad.nn.files import default_model_path, model_file
 from vhquad.nn.network import VectorHeatNet
 from vhquad.nn.settings import ModelSettings
 
@@ -83,11 +84,7 @@ def load_model(path: Path | str | None = None) -> Model:
         If a file is missing, damaged, not a vhquad model, of another version, or if weights and
         settings do not fit each other.
     """
-    if path is None or str(path) == "default":
-        path = default_model_path()
-    path = Path(path)
-    if path.is_dir():
-        path = path / "model.safetensors"
+    path = model_file(path)
     about = _read_about(path)
     try:
         settings = ModelSettings.from_dict(about["settings"])
@@ -110,25 +107,6 @@ def load_model(path: Path | str | None = None) -> Model:
     network.load_state_dict({name: value.float() for name, value in state.items()})
     network.eval()
     return Model(network, about.get("losses", {}), about.get("notes", {}))
-
-
-def default_model_path() -> Path:
-    """Where the shipped model lies: in the installed package, else in the source checkout.
-
-    Raises
-    ------
-    ModelError
-        If it is in neither.
-    """
-    package = Path(__file__).resolve().parent.parent
-    for folder in (package / "models", package.parent / "models"):
-        candidate = folder / "default.safetensors"
-        if candidate.exists():
-            return candidate
-    raise ModelError(
-        f"the default model is missing (looked in {package / 'models'}); reinstall vhquad, or name "
-        "a model with --model"
-    )
 
 
 def _read_about(path: Path) -> dict[str, Any]:
