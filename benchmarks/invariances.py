@@ -23,6 +23,7 @@ import numpy as np
 import torch
 from matplotlib.colors import LinearSegmentedColormap
 from numpy.typing import NDArray
+from PIL import Image
 
 from vhquad.atomic import write_atomic
 from vhquad.field.cross import CrossField
@@ -370,6 +371,9 @@ def draw(path: Path, titles: list[str], changes: list[Change], view: View | None
                 show_scalar_bar=False,
             )
             draw_crosses(plotter, pv, mesh, field, CROSSES)
+    with Image.open(path) as image:
+        small = image.convert("RGB").quantize(64)
+    small.save(path, optimize=True)
 
 
 def main() -> None:

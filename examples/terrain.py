@@ -9,7 +9,7 @@ the shape. The truth is the gradient of the exact geodesic distance (libigl). Be
 stand the simplest guide there is, to go uphill, which ends on the next hill, and the best of the
 network's own inputs (gradients of the heat kernel signature), which shows what learning adds.
 
-About five minutes on one core. The picture needs the extra ``viz``.
+Two and a half CPU minutes on one core. The picture needs the extra ``viz``.
 """
 
 from __future__ import annotations
