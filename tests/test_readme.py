@@ -108,7 +108,7 @@ def test_options_are_explained_and_exist(invoke: Invoke) -> None:
             assert not missing, f"README does not explain {missing} of {name}"
         known |= options
     known |= set(re.findall(r"--[a-z][a-z-]*", invoke("--help").out))
-    known |= {"--force-reinstall", "--count", "--quads"}  # of pip, of the examples
+    known |= {"--force-reinstall", "--count", "--quads", "--picture"}  # of pip, of the examples
     text = re.sub(r"\]\([^)]*\)", "", README)
     named = set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", text))
     assert named <= known, f"README names unknown options {named - known}"
