@@ -105,19 +105,18 @@ def local_curvature(
     # The defect of a border vertex is no curvature: its area is left out of the mean.
     inside = np.where(mesh.is_boundary_vertex, 0.0, mass)
     bends = 0.5 * np.bincount(mesh.tail, bend, n)
-    numbers = np.stack([bends, mass, angle_defect(mesh, frames), inside], axis=1) / mass[:, None]
+    numbers = np.stack([bends, angle_defect(mesh, frames), inside], axis=1) / mass[:, None]
     scalar, lines = cotan_laplacian(tri), connection_laplacian(tri, order=2)
     gradient = gradient_operator(tri)
     found: tuple[list[NDArray], ...] = ([], [], [], [], [])
     for radius in radii:
         near = _smoother(scalar, mass, radius**2)(numbers)
-        mean = near[:, 0] / near[:, 1]
-        gaussian = np.divide(near[:, 2], near[:, 3], out=np.zeros(n), where=near[:, 3] > 1e-12)
+        gaussian = np.divide(near[:, 1], near[:, 2], out=np.zeros(n), where=near[:, 2] > 1e-12)
         found[0].append(radius**2 * gaussian)
-        found[1].append(radius * mean)
+        found[1].append(radius * near[:, 0])
         found[2].append(radius**3 * (gradient @ gaussian))
-        found[3].append(radius**2 * (gradient @ mean))
-        found[4].append(radius * _smoother(lines, mass, radius**2)(line / mass) / near[:, 1])
+        found[3].append(radius**2 * (gradient @ near[:, 0]))
+        found[4].append(radius * _smoother(lines, mass, radius**2)(line / mass))
     return LocalCurvature(*(np.stack(part, axis=1) for part in found))
 
 
