@@ -9,7 +9,7 @@ side on the meshes that all of them were given) and ``runs.md`` (a line for ever
 from __future__ import annotations
 
 import argparse
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from statistics import mean, median
@@ -117,19 +117,19 @@ FIGURES = (
 
 
 def peers(runs: list[Result]) -> list[str]:
-    """A table for each target, over the meshes that every tool was given."""
+    """A table for each target, over the meshes that every tool was given; of ours the default."""
     by: dict[int, dict[str, dict[tuple[str, str], Result]]] = defaultdict(lambda: defaultdict(dict))
     for run in runs:
         by[run["target"]][run["tool"]][(run["folder"], run["mesh"])] = run
     lines: list[str] = []
     for target, tools in sorted(by.items()):
-        names = [tool for tool in TOOLS if tool in tools]
-        if not set(names) - set(OURS):
+        names = [tool for tool in TOOLS if tool in tools and tool != "curvature"]
+        if len(names) < 2:
             continue
         common = sorted(set.intersection(*(set(tools[name]) for name in names)))
         columns = [column([tools[name][key] for key in common]) for name in names]
         rows = [(text, *values) for text, *values in zip(FIGURES, *columns, strict=True)]
-        heads = [f"vhquad, {name}" if name in OURS else name for name in names]
+        heads = ["vhquad" if name in OURS else name for name in names]
         lines += [f"## {target} quads, {len(common)} meshes", "", *table(("", *heads), rows), ""]
     return lines
 
@@ -166,6 +166,28 @@ def line(run: Result) -> Row:
     ]
 
 
+TITLES = {
+    "bars": "What vhquad is held to",
+    "peers": "Side by side",
+    "runs": "Every run",
+}
+
+
+def heading(name: str, runs: list[Result]) -> list[str]:
+    """Title, commands and what was run."""
+    count = Counter((run["target"], run["tool"]) for run in runs)
+    said = [f"{n} x {tool} at {target}" for (target, tool), n in sorted(count.items())]
+    commits = sorted({run["commit"] for run in runs if run["tool"] in OURS})
+    return [
+        f"# {TITLES[name]}",
+        "",
+        "Made by `make_suite.py`, `remesh_folder.py` and `summary.py`, see [README.md](README.md);",
+        "one thread a run; CPU time and memory are those of the whole process, start included.",
+        "",
+        f"Runs: {', '.join(said)}. Commits: {', '.join(commits)}.",
+    ]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("results", type=Path)
@@ -182,8 +204,8 @@ def main() -> None:
         "runs": table(HEADER, [line(run) for run in order]),
     }
     for name, lines in texts.items():
-        head = f"`python benchmarks/summary.py` of {len(runs)} runs of `remesh_folder.py`"
-        (options.out / f"{name}.md").write_text("\n".join([head, "", *lines]) + "\n")
+        text = "\n".join([*heading(name, runs), "", *lines])
+        (options.out / f"{name}.md").write_text(text.rstrip() + "\n")
 
 
 if __name__ == "__main__":
