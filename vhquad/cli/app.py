@@ -6,6 +6,8 @@ so that ``vhquad --help`` answers at once.
 
 from __future__ import annotations
 
+import atexit
+import gc
 import signal
 import sys
 from collections.abc import Sequence
@@ -69,6 +71,10 @@ def options(
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; leaves by SystemExit, as ``sys.exit`` does."""
     given = list(sys.argv[1:] if arguments is None else arguments)
+    # Importing torch makes half a million objects that stay. Looking through them for garbage takes
+    # 0.2 s of CPU time on the way and 0.5 s on leaving.
+    gc.set_threshold(100_000, 20, 20)
+    atexit.register(gc.freeze)
     signal.signal(signal.SIGTERM, _terminated)
     try:
         app(args=_global_first(given), prog_name="vhquad")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -10,7 +12,17 @@ import typer
 
 from vhquad.errors import ConfigError
 
-__all__ = ["Device", "FullResolution", "JsonFile", "Mesh", "ModelFile", "NoCache", "parse_crease"]
+__all__ = [
+    "Device",
+    "FullResolution",
+    "JsonFile",
+    "Mesh",
+    "ModelFile",
+    "NoCache",
+    "Threads",
+    "limit_threads",
+    "parse_crease",
+]
 
 Mesh = Annotated[
     Path,
@@ -45,6 +57,17 @@ FullResolution = Annotated[
 NoCache = Annotated[
     bool, typer.Option("--no-cache", help="Neither use nor keep anything in the cache folder.")
 ]
+Threads = Annotated[
+    int | None,
+    typer.Option(
+        "--threads",
+        metavar="N",
+        min=1,
+        help="Threads for linear algebra, no more than there are cores.  [default: what the "
+        "libraries choose, by OMP_NUM_THREADS and the cores]",
+        show_default=False,
+    ),
+]
 JsonFile = Annotated[
     Path | None,
     typer.Option(
@@ -54,6 +77,22 @@ JsonFile = Annotated[
         show_default=False,
     ),
 ]
+
+
+def limit_threads(threads: int | None) -> None:
+    """Have the libraries for linear algebra use so many threads, at most one for each core.
+
+    They look at the environment when they are first imported, so this goes before numpy.
+    """
+    if threads is None:
+        return
+    own = getattr(os, "sched_getaffinity", None)  # the cores this process may use; Linux only
+    cores = len(own(0)) if own is not None else os.cpu_count() or 1
+    for library in ("OMP", "OPENBLAS", "MKL", "VECLIB"):
+        name = "VECLIB_MAXIMUM_THREADS" if library == "VECLIB" else f"{library}_NUM_THREADS"
+        os.environ[name] = str(min(threads, cores))
+    if "torch" in sys.modules:
+        sys.modules["torch"].set_num_threads(min(threads, cores))
 
 
 def parse_crease(text: str) -> float | None:

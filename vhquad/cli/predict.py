@@ -9,7 +9,16 @@ from typing import Annotated
 import typer
 
 from vhquad.cli.guard import Shell, guarded, warn
-from vhquad.cli.options import Device, FullResolution, JsonFile, Mesh, ModelFile, NoCache
+from vhquad.cli.options import (
+    Device,
+    FullResolution,
+    JsonFile,
+    Mesh,
+    ModelFile,
+    NoCache,
+    Threads,
+    limit_threads,
+)
 from vhquad.cli.outputs import MESHES, check_outputs, json_file
 
 __all__ = ["FIELDS", "predict"]
@@ -37,6 +46,7 @@ def predict(
     device: Device = "auto",
     full_resolution: FullResolution = False,
     no_cache: NoCache = False,
+    threads: Threads = None,
     mesh_out: Annotated[
         Path | None,
         typer.Option(
@@ -53,6 +63,7 @@ def predict(
     A cross says in which directions the edges of quads should run. Use the file with
     `vhquad remesh --field`, QuadWild, Directional or libigl.
     """
+    limit_threads(threads)
     target = mesh.with_suffix(".ffield") if out is None else out
     check_outputs(
         [

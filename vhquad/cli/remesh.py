@@ -16,6 +16,8 @@ from vhquad.cli.options import (
     Mesh,
     ModelFile,
     NoCache,
+    Threads,
+    limit_threads,
     parse_crease,
 )
 from vhquad.cli.outputs import MESHES, check_outputs, json_file
@@ -145,6 +147,7 @@ def remesh(
     device: Device = "auto",
     full_resolution: FullResolution = False,
     no_cache: NoCache = False,
+    threads: Threads = None,
     seed: Annotated[int, typer.Option("--seed", help="The same seed gives the same quads.")] = 0,
     uv_out: Annotated[
         Path | None,
@@ -170,6 +173,7 @@ def remesh(
 
     The cross field comes from the network unless --method or --field say otherwise.
     """
+    limit_threads(threads)
     target = mesh.with_name(f"{mesh.stem}_quads.obj") if out is None else out
     angle = parse_crease(crease)
     check_outputs(

@@ -23,7 +23,8 @@ from vhquad.cache import (
     write_arrays,
 )
 from vhquad.errors import MeshError
-from vhquad.field.features import drop_short_creases, find_creases
+from vhquad.field.creases import LOOSE, TOGETHER, creases_for_quads
+from vhquad.field.features import drop_short_creases
 from vhquad.field.prune import prune_branches
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.shapely import shapely
@@ -41,7 +42,6 @@ FEWEST_FACES = 50_000  # below this there is little to gain
 WORTH_FROM = 2.0  # times as many faces must there be
 CELL = 0.8  # of the grid, in quad edges
 MOST_SLIVERS = 1e-4  # of the faces
-CREASE_LENGTH, LOOSE_CREASE = 2.5, 1.5  # quad edges; as for meshes without a stand-in
 
 _ARRAYS = ("vertices", "faces", "creases")
 
@@ -97,8 +97,8 @@ def make_stand_in(
         None where the mesh is not much finer than its quads, or where decimation would not leave
         the topology, the borders and the creases as they are: the mesh then serves itself.
     """
-    steps = np.ceil(np.log2(max(FACES_A_QUAD * n_quads / FEWEST_FACES, 1.0)))
-    budget = int(FEWEST_FACES * 2**steps)
+    steps = np.rint(np.log2(max(FACES_A_QUAD * n_quads / FEWEST_FACES, 1.0)))
+    budget = int(FEWEST_FACES * 2**steps)  # 7 to 14 triangles a quad
     if mesh.n_faces < WORTH_FROM * budget:
         return None
     quads = budget / FACES_A_QUAD
@@ -119,8 +119,8 @@ def make_stand_in(
     copy, lines = found
     if creases is None and len(lines):
         edge = float(np.sqrt(mesh.area / n_quads))
-        lines = drop_short_creases(copy, lines, CREASE_LENGTH * edge)
-        lines = prune_branches(copy, lines, LOOSE_CREASE * edge)
+        lines = drop_short_creases(copy, lines, TOGETHER * edge)
+        lines = prune_branches(copy, lines, LOOSE * edge)
     return StandIn(copy, lines, mesh)
 
 
@@ -146,7 +146,7 @@ def _made(
     if creases is None:
         creases = np.zeros((0, 2), dtype=np.int64)
         if angle is not None:
-            creases = find_creases(mesh, angle, CREASE_LENGTH * edge)
+            creases = creases_for_quads(mesh, angle, edge)
     feature = mesh.is_boundary_vertex.copy()
     feature[creases] = True
     vertices, faces = [], []

@@ -1,0 +1,65 @@
+"""The clocks of the speed benchmark: nested steps are taken out, and a run yields every step."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from argparse import Namespace
+from pathlib import Path
+
+import pytest
+
+from tests.meshes import icosphere
+from vhquad.mesh.io import write_triangle_mesh
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+
+import speed
+import speed_run
+
+
+def test_a_step_does_not_count_what_is_inside_it() -> None:
+    clock = speed_run.Clock()
+    inner = clock.timed("inner", lambda: time.sleep(0.2))
+
+    def work() -> str:
+        time.sleep(0.05)
+        inner()
+        inner()
+        return "done"
+
+    assert clock.timed("outer", work)() == "done"
+    assert 0.4 <= clock.seconds["inner"][1] < 0.6
+    assert 0.05 <= clock.seconds["outer"][1] < 0.2
+    assert clock.seconds["inner"][0] < 0.2  # sleeping takes no CPU
+
+
+def test_steps_name_functions_that_exist() -> None:
+    import importlib
+
+    for names in speed_run.STEPS.values():
+        for name in names:
+            home, attribute = name.rsplit(".", 1)
+            assert callable(getattr(importlib.import_module(home), attribute)), name
+
+
+def test_a_run_and_its_second(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mesh = tmp_path / "ball.obj"
+    write_triangle_mesh(mesh, icosphere(3))
+    entry = speed.measure(mesh, 300, Namespace(repeat=1, second=True, eigsh=1000, peers=False))
+    assert entry["vertices"] == 642
+    run, second = entry["remesh"], entry["second"]
+    assert run["code"] in (0, 3)
+    assert set(speed_run.STEPS) - {"proxy"} <= set(run["steps"])
+    spent = sum(step["cpu"] for step in run["steps"].values())
+    assert 0.5 * run["cpu"] < spent <= run["cpu"]  # what is left is the way out
+    assert "network" not in second["steps"]  # the field was kept
+    assert "map" in second["steps"]
+    assert entry["eigenpairs"]["eigsh"] > 0
+    json.dumps(entry)
+    speed.show([entry])
+    assert "eigenpairs, eigsh" in capsys.readouterr().out
+    pytest.importorskip("matplotlib")
+    speed.plot([entry, {**entry, "vertices": 6420}], tmp_path / "speed.png")
+    assert (tmp_path / "speed.png").stat().st_size > 5000
