@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,8 @@ __all__ = ["check_indices", "parse_obj", "parse_off"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+_NO_INTEGER = re.compile(r"[^\d\s-]|\d-|\d{18}")
 
 
 def parse_obj(text: str) -> PolygonSoup:
@@ -35,7 +38,7 @@ def parse_obj(text: str) -> PolygonSoup:
     points = [i for i, k in enumerate(kind) if k == "v "]
     faces = [i for i, k in enumerate(kind) if k == "f "]
     strips = [i for i, k in enumerate(kind) if k == "l "]
-    vertices = _numbers([lines[i][2:].split()[:3] for i in points], points, "vertex")
+    vertices = _numbers([lines[i][2:] for i in points], points, "vertex")
     corners, sizes = _references(lines, faces, points, len(vertices), "face")
     chain, lengths = _references(lines, strips, points, len(vertices), "line")
     inner = np.ones(len(chain), dtype=bool)
@@ -45,8 +48,23 @@ def parse_obj(text: str) -> PolygonSoup:
     return PolygonSoup(vertices, corners, sizes, lines=pairs)
 
 
-def _numbers(rows: list[list[str]], places: Sequence[int], what: str) -> Floats:
-    """Rows of three numbers as an array; `places` are the 0-based lines, for the message."""
+def _table(rows: list[str], dtype: type, columns: range | None = None) -> NDArray[Any] | None:
+    """Rows of as many numbers each as an array; None if they are anything else."""
+    if not rows:
+        return None
+    try:
+        found: NDArray[Any] = np.loadtxt(rows, dtype=dtype, usecols=columns, comments=None, ndmin=2)
+    except ValueError:
+        return None
+    return found if len(found) == len(rows) else None
+
+
+def _numbers(texts: list[str], places: Sequence[int], what: str) -> Floats:
+    """The first three numbers of each row; `places` are the 0-based lines, for the message."""
+    found = _table(texts, np.float64, range(3))
+    if found is not None:
+        return found
+    rows = [text.split()[:3] for text in texts]
     try:
         flat = np.array([float(x) for row in rows for x in row], dtype=np.float64)
         if len(flat) == 3 * len(rows) and all(len(row) == 3 for row in rows):
@@ -70,6 +88,12 @@ def _references(
     joined = "\n".join(lines[i][2:] for i in places)
     if "/" in joined:
         joined = re.sub(r"/\S*", "", joined)
+    even = None
+    if places and not _NO_INTEGER.search(joined):
+        even = _table(joined.split("\n"), np.int64)
+    if even is not None:
+        sizes = np.full(len(even), even.shape[1], dtype=np.int64)
+        return _zero_based(even.reshape(-1), sizes, places, points, n), sizes
     rows = [row.split() for row in joined.split("\n")] if places else []
     sizes = np.array([len(row) for row in rows], dtype=np.int64)
     try:
@@ -81,6 +105,11 @@ def _references(
                     f"line {place + 1} is not a {what}: {lines[place][:60]!r}"
                 ) from None
         raise
+    return _zero_based(index, sizes, places, points, n), sizes
+
+
+def _zero_based(index: Ints, sizes: Ints, places: list[int], points: list[int], n: int) -> Ints:
+    """Vertices counted from 0, where a file counts from 1, or from the last one read down."""
     line_of = np.repeat(np.array(places, dtype=np.int64), sizes)
     # Negative indices count back from the vertices read so far.
     known = np.searchsorted(np.array(points, dtype=np.int64), line_of)
@@ -91,7 +120,7 @@ def _references(
             f"line {line_of[bad[0]] + 1} names vertex {index[bad[0]]}, but there are {n}"
             f" ({len(bad)} such corners)"
         )
-    return zero_based, sizes
+    return zero_based
 
 
 def parse_off(text: str) -> PolygonSoup:
@@ -116,7 +145,7 @@ def parse_off(text: str) -> PolygonSoup:
     if n < 0 or m < 0 or len(rows) < 1 + n + m:
         raise MeshError(f"{n} vertices and {m} faces are announced, but the file ends early")
     places = [i for i, _ in rows[1 : 1 + n]]
-    vertices = _numbers([row[:3] for _, row in rows[1 : 1 + n]], places, "vertex")
+    vertices = _numbers([" ".join(row) for _, row in rows[1 : 1 + n]], places, "vertex")
     corners: list[int] = []
     sizes = []
     for place, row in rows[1 + n : 1 + n + m]:
