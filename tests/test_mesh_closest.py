@@ -96,3 +96,26 @@ def test_triangles_without_area_do_no_harm() -> None:
     points = np.array([[1.5, 1.0, 0.0], [-1.0, 3.0, 0.0], [0.0, 1.5, 2.0]])
     np.testing.assert_allclose(tree.query(points).distance, [1.0, 1.0, 2.0])
     np.testing.assert_allclose(tree.distance(points), [1.0, 1.0, 2.0])
+
+
+def test_walks_stay_on_their_sheet() -> None:
+    """On a thin slab a point beyond the lower side is walked to on the upper one."""
+    box = meshes.cube(8)
+    slab = TriMesh(box.vertices * [1.0, 1.0, 0.01], box.faces)
+    surface = ClosestPoints(slab)
+    start = surface.query([[0.3, -0.2, 1.0]])
+    hits = surface.query_near([[-0.2, 0.1, -0.02]], start.face)
+    np.testing.assert_allclose(hits.point, [[-0.2, 0.1, 0.005]], atol=1e-12)
+    assert surface.query([[-0.2, 0.1, -0.02]]).point[0, 2] == pytest.approx(-0.005)
+
+
+def test_walks_on_a_sphere_end_at_the_closest_point(rng: np.random.Generator) -> None:
+    mesh = meshes.icosphere(3)
+    surface = ClosestPoints(mesh)
+    start = rng.integers(mesh.n_faces, size=50)
+    p = mesh.face_normals[start] + 0.5 * rng.normal(size=(50, 3))
+    p *= 1.2 / np.linalg.norm(p, axis=1, keepdims=True)
+    hits = surface.query_near(p, start)
+    np.testing.assert_allclose(hits.distance, surface.distance(p), rtol=1e-6)
+    np.testing.assert_allclose(hits.interpolate(mesh.vertices[mesh.faces]), hits.point, atol=1e-12)
+    assert len(surface.query_near(np.zeros((0, 3)), np.zeros(0, dtype=int)).face) == 0

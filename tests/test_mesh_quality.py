@@ -118,6 +118,16 @@ def test_flipped_quads_are_named() -> None:
     assert flipped_quads(QuadMesh(v, ball.quads), ClosestPoints(meshes.cube(4))).size == 0
 
 
+@pytest.mark.parametrize(("thickness", "count"), [(0.02, 0), (0.5, 1)])
+def test_sheets_thinner_than_a_quad_flip_nothing(thickness: float, count: int) -> None:
+    """A quad of the upper side lies a little below a slab: wrong only if that side is far away."""
+    box = meshes.cube(4)
+    slab = TriMesh(box.vertices * [1.0, 1.0, thickness], box.faces)
+    z = -0.5 * thickness - 0.001
+    one = QuadMesh([[0, 0, z], [0.1, 0, z], [0.1, 0.1, z], [0, 0.1, z]], [[0, 1, 2, 3]])
+    assert len(flipped_quads(one, ClosestPoints(slab))) == count
+
+
 def test_distance_between_shells() -> None:
     inner, outer = meshes.icosphere(4, 1.0), meshes.icosphere(4, 1.1)
     d = apart(inner, outer)

@@ -76,12 +76,15 @@ def _bridge(
     mesh: TriMesh, graph: csr_matrix, pairs: Ints, degree: Ints, end: int, reach: float
 ) -> tuple[float, list[int]]:
     """Length and vertices of the best bridge from a loose end; no vertices if there is none."""
-    away, before = dijkstra(
-        graph, directed=False, indices=end, limit=BLUNT * reach, return_predecessors=True
+    start = np.array([end])
+    ways, befores = dijkstra(
+        graph, directed=False, indices=start, limit=BLUNT * reach, return_predecessors=True
     )
+    away, before = ways[0], befores[0]
     span = np.linalg.norm(mesh.vertices[pairs[:, 0]] - mesh.vertices[pairs[:, 1]], axis=1)
     creases = coo_matrix((span, (pairs[:, 0], pairs[:, 1])), (mesh.n_vertices,) * 2).tocsr()
-    round_way = dijkstra(creases, directed=False, indices=end, limit=DETOUR * BLUNT * reach)
+    limit = DETOUR * BLUNT * reach
+    round_way = dijkstra(creases, directed=False, indices=start, limit=limit)[0]
     other = pairs[(pairs == end).any(axis=1)][0].sum() - end
     ahead = mesh.vertices[end] - mesh.vertices[other]
     goals = np.flatnonzero((degree > 0) & (away < np.inf) & (round_way > DETOUR * away))

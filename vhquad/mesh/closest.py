@@ -84,6 +84,53 @@ class ClosestPoints:
         point = np.einsum("qk,qki->qi", barycentric, corners)
         return Hits(np.linalg.norm(p - point, axis=1), face, barycentric, point)
 
+    def query_near(self, points: ArrayLike, faces: ArrayLike) -> Hits:
+        """Closest point of each query that a walk downhill finds, at most two faces a step.
+
+        Where sheets nearly touch, the closest point of all may be on the other one; this stays on
+        the sheet of the starting face.
+
+        Parameters
+        ----------
+        points : (q, 3) array_like
+        faces : (q,) array_like of int
+            Where each walk starts.
+
+        Returns
+        -------
+        Hits
+        """
+        p = np.array(points, dtype=np.float64)
+        face = np.array(faces, dtype=np.int64)
+        beside = np.where(self.mesh.twin >= 0, self.mesh.twin // 3, -1).reshape(-1, 3)
+        barycentric, square = self._nearest_in(face, p)
+        walking = np.arange(len(p))
+        while len(walking):
+            here = face[walking]
+            one = np.where(beside[here] >= 0, beside[here], here[:, None])
+            two = np.where(beside[one] >= 0, beside[one], one[:, :, None])
+            following = np.concatenate([one, two.reshape(len(here), 9)], axis=1)
+            weights, squares = self._nearest_in(
+                following.reshape(-1), np.repeat(p[walking], 12, axis=0)
+            )
+            squares = squares.reshape(-1, 12)
+            best = squares.argmin(axis=1)
+            row = np.arange(len(walking))
+            nearer = squares[row, best] < square[walking] * (1.0 - 1e-9)
+            row, best, walking = row[nearer], best[nearer], walking[nearer]
+            face[walking] = following[row, best]
+            barycentric[walking] = weights.reshape(-1, 12, 3)[row, best]
+            square[walking] = squares[row, best]
+        point = np.einsum("qk,qki->qi", barycentric, self._vertices[self._faces[face]])
+        return Hits(np.sqrt(square), face, barycentric, point)
+
+    def _nearest_in(self, face: Ints, points: Floats) -> tuple[Floats, Floats]:
+        """Barycentrics of the points of given faces nearest to queries, and squared distances."""
+        corners = self._vertices[self._faces[face]]
+        weights = closest_barycentrics(corners, points)
+        gap = points - np.einsum("qk,qki->qi", weights, corners)
+        return weights, np.einsum("qi,qi->q", gap, gap)
+
     def distance(self, points: ArrayLike) -> Floats:
         """Distance of each point from the surface, half the work of :meth:`query`; (q,)."""
         return np.sqrt(self._search(points)[1])

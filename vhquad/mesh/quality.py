@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vhquad.mesh.closest import ClosestPoints
+from vhquad.mesh.closest import ClosestPoints, closest_barycentrics
 from vhquad.mesh.distance import Distance, surface_distance
 from vhquad.mesh.intersections import self_intersections
 from vhquad.mesh.quad import QuadMesh
@@ -168,8 +168,9 @@ def flipped_quads(mesh: QuadMesh, surface: ClosestPoints) -> Ints:
 
     The surface's normal at the point closest to the quad's middle decides; where it is more than
     60 degrees off, so do those at four points half way to the corners, which spares quads across
-    a crease. Where two sheets nearly touch, as at lips, the nearest one may be the other: the
-    corners, which lie on their own sheet, must face against the surface as well.
+    a crease. Where two sheets nearly touch, as at lips, or a part is thinner than its quads, the
+    nearest sheet may be the other: the corners, which lie on their own sheet, must face against
+    the surface as well, and no face within an edge length of the middle may face the quad's way.
 
     Parameters
     ----------
@@ -193,7 +194,25 @@ def flipped_quads(mesh: QuadMesh, surface: ClosestPoints) -> Ints:
     beneath = beneath[doubt] + normal[face].sum(axis=1)
     doubt = doubt[np.einsum("qi,qi->q", beneath, own[doubt]) < 0]
     face = surface.query(p[doubt].reshape(-1, 3)).face.reshape(-1, 4)
-    return doubt[np.einsum("qi,qi->q", normal[face].sum(axis=1), own[doubt]) < 0]
+    doubt = doubt[np.einsum("qi,qi->q", normal[face].sum(axis=1), own[doubt]) < 0]
+    return doubt[~_has_own_sheet(middle[doubt], own[doubt], surface.mesh)]
+
+
+def _has_own_sheet(middle: Floats, own: Floats, mesh: TriMesh) -> NDArray[np.bool_]:
+    """Whether a face that faces the quad's way lies within the quad's edge length; (q,)."""
+    out = np.zeros(len(middle), dtype=bool)
+    if len(middle) == 0:
+        return out
+    centre, widest = mesh.vertices[mesh.faces].mean(axis=1), mesh.edge_lengths.max()
+    for i, (m, n) in enumerate(zip(middle, own, strict=True)):  # few
+        area = float(np.linalg.norm(n))
+        same = np.flatnonzero(mesh.face_normals @ n > 0.5 * area)
+        near = same[np.linalg.norm(centre[same] - m, axis=1) < np.sqrt(area) + widest]
+        corners = mesh.vertices[mesh.faces[near]]
+        weights = closest_barycentrics(corners, np.broadcast_to(m, (len(near), 3)))
+        gap = np.linalg.norm(np.einsum("qk,qki->qi", weights, corners) - m, axis=1)
+        out[i] = (gap < np.sqrt(area)).any()
+    return out
 
 
 def _area_vectors(mesh: QuadMesh) -> Floats:

@@ -19,11 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from vhquad.errors import ConfigError, FieldError, ParametrizationError
 from vhquad.field.align import AlignedField, AlignSettings, align_field
-from vhquad.field.bridge import bridge_gaps
+from vhquad.field.creases import TOGETHER, creases_for_quads
 from vhquad.field.cross import CrossField
 from vhquad.field.density import bend_to_density
-from vhquad.field.features import find_creases
-from vhquad.field.prune import prune_branches
 from vhquad.field.transport import to_faces
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.quad import QuadMesh
@@ -52,8 +50,6 @@ Bools = NDArray[np.bool_]
 LEAST_QUADS = 6
 NEAR_COUNT = 1.10
 SMALL_SHARE = 0.005  # of all quads: so much too many or too few in one component is near enough
-CREASE_GAP = 0.75  # quads; creases that end so near others go on to them
-LOOSE_CREASE = 1.5  # quads; shorter creases that end loose are noise
 
 Progress = Callable[[str, float], None]
 
@@ -340,14 +336,12 @@ class _Attempt:
             return given
         if angle is None:
             return np.zeros((0, 2), dtype=np.int64)
-        found = find_creases(mesh, angle, self.crease_length * length)
-        found = bridge_gaps(mesh, found, CREASE_GAP * length)
-        return prune_branches(mesh, found, LOOSE_CREASE * length)
+        return creases_for_quads(mesh, angle, length, self.crease_length)
 
 
 MAP, PAIRED = "integer-grid map", "paired triangles"
 _ATTEMPTS = (
-    _Attempt(MAP, 0.5, 2.5),
+    _Attempt(MAP, 0.5, TOGETHER),
     _Attempt(f"{MAP}, smoother field", 1.5, 8.0),
     _Attempt(f"{MAP}, no creases", 1.5, None),
     _Attempt(f"{MAP}, no creases, smoothest field", 5.0, None),
@@ -377,7 +371,7 @@ def _remesh_part(
     for attempt in _ATTEMPTS:
         creases = attempt.creases(mesh, given, angle, length)
         try:
-            mapped = _by_map(mesh, field, creases, seam, target, attempt, surface, watch, tell)
+            mapped = _by_map(mesh, field, creases, seam, target, attempt, watch, tell)
         except (ParametrizationError, FieldError) as problem:
             reasons.append(str(problem))
             continue
@@ -391,7 +385,7 @@ def _remesh_part(
     uv: UvMap | None = None
     if best is not None:
         _, mapped, method = best
-        quads, done = mapped.quads, mapped.aligned.report
+        quads, done = _polished(mapped, surface, watch, tell), mapped.aligned.report
         singularities, cancelled = done.singularities, done.pairs_cancelled
         if with_uv:
             with watch("integer-grid map"):
@@ -422,11 +416,10 @@ def _by_map(
     seam: Bools | None,
     target: int,
     attempt: _Attempt,
-    surface: ClosestPoints,
     watch: _Watch,
     tell: Progress,
 ) -> _Mapped:
-    """Quads by an integer-grid map.
+    """Quads by an integer-grid map, their vertices where the map has them.
 
     Raises
     ------
@@ -453,13 +446,19 @@ def _by_map(
     tell("lay out", 0.7)
     with watch("lay out"):
         vertices = embed_layout(layout, aligned, seamless)
-    draft = QuadMesh(vertices, layout.quads)
-    _require_topology(draft, mesh)
+    quads = QuadMesh(vertices, layout.quads)
+    _require_topology(quads, mesh)
+    return _Mapped(quads, aligned, seamless, tracing, layout)
+
+
+def _polished(mapped: _Mapped, surface: ClosestPoints, watch: _Watch, tell: Progress) -> QuadMesh:
+    """The quads with their vertices moved on the surface to even shapes and sizes."""
     tell("polish", 0.75)
+    quads = mapped.quads
     with watch("polish"):
-        fixed, curves = _constraints(layout)
-        vertices = smooth_quads(vertices, layout.quads, surface, fixed, curves, loosen=True)
-    return _Mapped(QuadMesh(vertices, layout.quads), aligned, seamless, tracing, layout)
+        fixed, curves = _constraints(mapped.layout)
+        moved = smooth_quads(quads.vertices, quads.quads, surface, fixed, curves, loosen=True)
+    return QuadMesh(moved, quads.quads)
 
 
 def _require_topology(quads: QuadMesh, mesh: TriMesh) -> None:

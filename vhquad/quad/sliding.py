@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vhquad.mesh.closest import ClosestPoints
+from vhquad.mesh.closest import ClosestPoints, Hits
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.distortion import corner_jacobians, distortion, quad_normals, unit
 
@@ -28,6 +28,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 SIZE_WEIGHT = 0.3
+SAME_SIDE = 0.2  # least cosine between normals before and after a step
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +52,7 @@ class State:
     vertices: Floats
     arc: Floats  # (n,) arc length of ``on_curve`` vertices on their curves, 0 elsewhere
     normals: Floats  # (n, 3) surface normals, smooth
-    facets: Floats  # (n, 3) normals of the surface's faces at the vertices
+    face: Ints  # (n,) face of the surface under each vertex
     quad_normals: Floats  # (k, 3) reference normals of the energy
     folded: Bools  # (k,)
     energy: float  # at the least epsilon, to rank states
@@ -85,13 +86,15 @@ def make_problem(
 
 
 def place(problem: Problem, wanted: Floats, before: State | None) -> State:
-    """Bring wanted positions back to the surface and the curves."""
-    mesh, line = problem.surface.mesh, problem.on_curve
+    """Bring wanted positions back to the surface and the curves.
+
+    A vertex whose closest point faces another way than where it was may have gone through the
+    surface; it walks there instead.
+    """
+    line = problem.on_curve
     hits = problem.surface.query(wanted)
-    normals = mesh.vertex_normals[mesh.faces[hits.face]]
-    normals = unit(np.einsum("qk,qki->qi", hits.barycentric, normals))
-    facets = mesh.face_normals[hits.face]
-    x = np.array(hits.point)
+    normals = _smooth_normals(problem, hits)
+    x, face = np.array(hits.point), np.array(hits.face)
     if before is None:
         arc = np.zeros(len(x))
         arc[line] = problem.curves.locate(line, wanted[line])
@@ -101,17 +104,28 @@ def place(problem: Problem, wanted: Floats, before: State | None) -> State:
         along = np.einsum("vi,vi->v", wanted[line] - before.vertices[line], tangent)
         arc = before.arc.copy()
         arc[line] = problem.curves.wrap(line, arc[line] + along)
-        wrong_side = np.einsum("vi,vi->v", normals, before.normals) < 0.2
-        wrong_side[line] = False
-        keep = problem.fixed | wrong_side
+        through = np.einsum("vi,vi->v", normals, before.normals) < SAME_SIDE
+        through[line] = through[problem.fixed] = False
+        walkers = np.flatnonzero(through)
+        walked = problem.surface.query_near(wanted[walkers], before.face[walkers])
+        x[walkers], face[walkers] = walked.point, walked.face
+        normals[walkers] = _smooth_normals(problem, walked)
+        keep = problem.fixed
         x[keep], normals[keep] = before.vertices[keep], before.normals[keep]
-        facets[keep] = before.facets[keep]
+        face[keep] = before.face[keep]
     x[line] = problem.curves.position(line, arc[line])
-    return measure(problem, x, arc, normals, facets)
+    return measure(problem, x, arc, normals, face)
 
 
-def measure(problem: Problem, x: Floats, arc: Floats, normals: Floats, facets: Floats) -> State:
-    """The state of given positions, arc lengths and normals at the vertices.
+def _smooth_normals(problem: Problem, hits: Hits) -> Floats:
+    """Unit vertex normals of the surface, interpolated; (n, 3)."""
+    mesh = problem.surface.mesh
+    corners = mesh.vertex_normals[mesh.faces[hits.face]]  # of these faces alone: there may be many
+    return unit(np.einsum("qk,qki->qi", hits.barycentric, corners))
+
+
+def measure(problem: Problem, x: Floats, arc: Floats, normals: Floats, face: Ints) -> State:
+    """The state of given positions, arc lengths, normals and faces at the vertices.
 
     Beside a sharp edge the smooth normal lies across; there a quad is right if it faces as the
     surface does at one of its corners.
@@ -119,13 +133,14 @@ def measure(problem: Problem, x: Floats, arc: Floats, normals: Floats, facets: F
     quads = problem.quads
     around, own = reference_normals(problem, normals), quad_normals(x, quads)
     facing = np.einsum("ki,ki->k", own, around)
+    facets = problem.surface.mesh.face_normals[face]
     nearest = np.einsum("kci,ki->kc", facets[quads], own).max(axis=1)
     inverted = (corner_jacobians(x, quads, own) <= 0).any(axis=1)
     folded = inverted | ((facing <= 0) & (nearest <= 0))
     trusted = ~folded & ((facing > 0.3) | (nearest > 0.7))
     reference = np.where(trusted[:, None], own, around)
     energy = distortion(x, quads, reference, problem.size, 1e-3, SIZE_WEIGHT, False).energy
-    return State(x, arc, normals, facets, reference, folded, energy)
+    return State(x, arc, normals, face, reference, folded, energy)
 
 
 def reference_normals(problem: Problem, normals: Floats) -> Floats:

@@ -203,7 +203,7 @@ def _solve_patch(problem: Problem, state: State, inside: Bools, spreading: int) 
     )
     if part.fixed.all():
         return state
-    names = ("vertices", "arc", "normals", "facets")
+    names = ("vertices", "arc", "normals", "face")
     start = measure(part, *(getattr(state, name)[used] for name in names))
     factor = laplacian_factor(part)
     solved = spread(part, start, factor, spreading)
