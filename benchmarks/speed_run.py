@@ -21,7 +21,7 @@ from typing import Any
 from vhquad.cache import default_cache_dir
 
 STEPS = {
-    "read": ["vhquad.mesh.load.read_polygons"],
+    "read": ["vhquad.mesh.load.read_polygons", "vhquad.api.load_kept"],
     "repair": ["vhquad.mesh.load.repair"],
     "stand-in": ["vhquad.api.make_stand_in"],
     "proxy": ["vhquad.learn.predict.make_proxy", "vhquad.learn.predict.carry_back"],

@@ -19,6 +19,7 @@ from vhquad.field.cross import CrossField
 from vhquad.field.io import read_field
 from vhquad.field.singular import find_singularities
 from vhquad.mesh.io import read_polygons
+from vhquad.mesh.kept import load_kept
 from vhquad.mesh.load import LoadedMesh, load
 from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.quality import check_quads
@@ -41,6 +42,7 @@ __all__ = [
     "clock",
     "describe_field",
     "load",
+    "load_kept",
     "own_field",
     "predict",
     "remesh",

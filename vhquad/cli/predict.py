@@ -85,7 +85,7 @@ def predict(
         seconds: dict[str, float] = {}
         progress(f"reading {mesh}")
         with api.clock(seconds, "read and repair"):
-            loaded = api.load(mesh)
+            loaded = api.load(mesh) if no_cache else api.load_kept(mesh)
         progress("predicting the field")
         with api.clock(seconds, "predict"):
             field = api.predict(

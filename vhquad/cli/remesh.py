@@ -215,7 +215,7 @@ def remesh(
         seconds: dict[str, float] = {}
         progress(f"reading {mesh}")
         with api.clock(seconds, "read and repair"):
-            loaded = api.load(mesh)
+            loaded = api.load(mesh) if no_cache else api.load_kept(mesh)
         factor = None
         if density is not None:
             count = loaded.mesh.n_vertices
