@@ -25,7 +25,7 @@ from vhquad.field.density import bend_to_density
 from vhquad.field.transport import to_faces
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.quad import QuadMesh
-from vhquad.mesh.quality import check_quads
+from vhquad.mesh.quality import check_quads, scaled_jacobians
 from vhquad.mesh.triangle import TriMesh
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.embed import embed_layout
@@ -50,6 +50,8 @@ Bools = NDArray[np.bool_]
 LEAST_QUADS = 6
 NEAR_COUNT = 1.10
 SMALL_SHARE = 0.005  # of all quads: so much too many or too few in one component is near enough
+
+MOST_POLISHED = 2  # attempts, while quads stay folded
 
 Progress = Callable[[str, float], None]
 
@@ -362,12 +364,15 @@ def _remesh_part(
 ) -> Part:
     """Quads of one component by the first attempt that gives a valid mesh of about the count.
 
+    If some of them stay folded, another attempt may do better.
+
     Within ``slack`` quads any count is near enough.
     """
     watch = _Watch()
     length = float(np.sqrt(mesh.area / target))
     reasons: list[str] = []
-    best: tuple[float, _Mapped, str] | None = None
+    rough: list[tuple[float, _Mapped, str]] = []  # of another count than asked for
+    done: list[tuple[int, _Mapped, QuadMesh, str]] = []
     for attempt in _ATTEMPTS:
         creases = attempt.creases(mesh, given, angle, length)
         try:
@@ -377,16 +382,24 @@ def _remesh_part(
             continue
         made = mapped.quads.n_quads
         miss = abs(np.log(made / target))
-        if best is None or miss < best[0]:
-            best = (miss, mapped, attempt.name)
-        if miss <= np.log(NEAR_COUNT) or abs(made - target) <= slack:
+        if miss > np.log(NEAR_COUNT) and abs(made - target) > slack:
+            rough.append((miss, mapped, attempt.name))
+            reasons.append(f"{made} quads where {target} were asked for")
+            continue
+        quads = _polished(mapped, surface, watch, tell)
+        folded = int((scaled_jacobians(quads) <= 0).any(axis=1).sum())
+        done.append((folded, mapped, quads, attempt.name))
+        if folded == 0 or len(done) == MOST_POLISHED:
             break
-        reasons.append(f"{made} quads where {target} were asked for")
+        reasons.append(f"{folded} quads stay folded")
+    if rough and not done:
+        _, mapped, name = min(rough, key=lambda found: found[0])
+        done.append((0, mapped, _polished(mapped, surface, watch, tell), name))
     uv: UvMap | None = None
-    if best is not None:
-        _, mapped, method = best
-        quads, done = _polished(mapped, surface, watch, tell), mapped.aligned.report
-        singularities, cancelled = done.singularities, done.pairs_cancelled
+    if done:
+        _, mapped, quads, method = min(done, key=lambda found: found[0])
+        aligning = mapped.aligned.report
+        singularities, cancelled = aligning.singularities, aligning.pairs_cancelled
         if with_uv:
             with watch("integer-grid map"):
                 uv = mapped.uv()
