@@ -35,7 +35,8 @@ from vhquad.field.transport import to_vertices
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.quality import scaled_jacobians
 from vhquad.mesh.triangle import TriMesh
-from vhquad.quad.pipeline import MAP, RemeshResult, RemeshSettings, remesh_mesh
+from vhquad.quad.component import MAP
+from vhquad.quad.pipeline import RemeshResult, RemeshSettings, remesh_mesh
 from vhquad.quad.quantize import Quantisation, quantise
 from vhquad.quad.tmesh import TMesh
 
@@ -286,11 +287,11 @@ def test_the_map_on_request() -> None:
 
 
 def test_a_field_without_a_map_falls_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    from vhquad.quad import pipeline
+    from vhquad.quad import component
 
-    solve = pipeline.solve_seamless_map
+    solve = component.solve_seamless_map
     monkeypatch.setattr(
-        pipeline, "solve_seamless_map", lambda aligned: replace(solve(aligned), flips=3, solves=9)
+        component, "solve_seamless_map", lambda aligned: replace(solve(aligned), flips=3, solves=9)
     )
     mesh = merge(icosphere(2), moved(grid(), (3.0, 0, 0)))
     result = run(mesh, 200)
@@ -304,13 +305,13 @@ def test_a_field_without_a_map_falls_back(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_a_layout_of_another_topology_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    from vhquad.quad import pipeline
+    from vhquad.quad import component
 
     def with_a_hole(tmesh: TMesh, target: float, area: float) -> Quantisation:
         made = quantise(tmesh, target, area)
         return replace(made, layout=replace(made.layout, quads=made.layout.quads[1:]))
 
-    monkeypatch.setattr(pipeline, "quantise", with_a_hole)
+    monkeypatch.setattr(component, "quantise", with_a_hole)
     result = run(icosphere(2), 100)
     check_valid(icosphere(2), result)
     part = result.report.components[0]

@@ -26,7 +26,8 @@ from vhquad.mesh.quality import check_quads
 from vhquad.mesh.repair import repair
 from vhquad.mesh.scalars import carried
 from vhquad.mesh.triangle import TriMesh
-from vhquad.quad.pipeline import PAIRED, RemeshResult, RemeshSettings, remesh_mesh
+from vhquad.quad.component import PAIRED
+from vhquad.quad.pipeline import RemeshResult, RemeshSettings, remesh_mesh
 from vhquad.quad.sizing import SIZE_RANGE, checked_density
 from vhquad.quad.stand_in import StandIn, make_stand_in
 from vhquad.report import CheckReport, FieldReport, MeshCounts

@@ -1,0 +1,252 @@
+"""Quads of one component: what is tried in turn until a valid mesh of about the count is there.
+
+The field is aligned (:mod:`vhquad.field.align`), turned into a seamless map
+(:mod:`vhquad.quad.seamless_map`), cut into rectangles (:mod:`vhquad.quad.tmesh`), quantised
+(:mod:`vhquad.quad.quantize`), laid on the surface (:mod:`vhquad.quad.embed`) and polished
+(:mod:`vhquad.quad.smooth`). Where no valid map is found the field is smoothed further, then
+creases are given up, and at last triangles are paired (:mod:`vhquad.quad.fallback`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vhquad.errors import FieldError, ParametrizationError
+from vhquad.field.align import AlignedField, AlignSettings, align_field
+from vhquad.field.creases import TOGETHER, creases_for_quads
+from vhquad.field.cross import CrossField
+from vhquad.mesh.closest import ClosestPoints
+from vhquad.mesh.quad import QuadMesh
+from vhquad.mesh.quality import scaled_jacobians
+from vhquad.mesh.triangle import TriMesh
+from vhquad.quad.curves import CurveConstraints
+from vhquad.quad.embed import embed_layout
+from vhquad.quad.fallback import triangles_to_quads
+from vhquad.quad.integer_map import integer_map
+from vhquad.quad.layout import Layout
+from vhquad.quad.motorcycle import Tracing, trace
+from vhquad.quad.parts import Part, UvMap
+from vhquad.quad.quantize import quantise
+from vhquad.quad.seamless_map import SeamlessMap, solve_seamless_map
+from vhquad.quad.smooth import smooth_quads
+from vhquad.quad.tmesh import build_tmesh
+from vhquad.quad.watch import Watch
+from vhquad.report import ComponentReport, MeshCounts
+
+__all__ = ["MAP", "PAIRED", "Progress", "remesh_component"]
+
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+NEAR_COUNT = 1.10  # a factor from the count asked for
+MOST_POLISHED = 2  # attempts, while quads stay folded
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class _Mapped:
+    """Quads from a map, with what made them."""
+
+    quads: QuadMesh
+    aligned: AlignedField
+    seamless: SeamlessMap
+    tracing: Tracing
+    layout: Layout
+
+    def uv(self) -> UvMap:
+        """The integer-grid map of the layout."""
+        made = integer_map(
+            self.aligned, self.seamless, self.tracing, self.layout.tmesh, self.layout
+        )
+        return UvMap(made.mesh, made.uv, made.flips)
+
+
+@dataclass(frozen=True)
+class _Attempt:
+    """One way to try; lengths are in wanted quad edges.
+
+    ``smoothing``: detail of the field below this is smoothed away. ``crease_length``: creases must
+    hang together over this length; None: no creases.
+    """
+
+    name: str
+    smoothing: float
+    crease_length: float | None
+
+    def creases(
+        self, mesh: TriMesh, given: Ints | None, angle: float | None, length: float
+    ) -> Ints:
+        """Crease edges of a component that this attempt keeps."""
+        if self.crease_length is None:
+            return np.zeros((0, 2), dtype=np.int64)
+        if given is not None:
+            return given
+        if angle is None:
+            return np.zeros((0, 2), dtype=np.int64)
+        return creases_for_quads(mesh, angle, length, self.crease_length)
+
+
+MAP, PAIRED = "integer-grid map", "paired triangles"
+_ATTEMPTS = (
+    _Attempt(MAP, 0.5, TOGETHER),
+    _Attempt(f"{MAP}, smoother field", 1.5, 8.0),
+    _Attempt(f"{MAP}, no creases", 1.5, None),
+    _Attempt(f"{MAP}, no creases, smoothest field", 5.0, None),
+)
+
+
+def remesh_component(
+    mesh: TriMesh,
+    field: CrossField,
+    given: Ints | None,
+    seam: Bools | None,
+    angle: float | None,
+    target: int,
+    slack: float,
+    surface: ClosestPoints,
+    with_uv: bool,
+    tell: Progress,
+) -> Part:
+    """Quads of one component by the first attempt that gives a valid mesh of about the count.
+
+    If some of them stay folded, another attempt may do better.
+
+    Within ``slack`` quads any count is near enough.
+    """
+    watch = Watch()
+    length = float(np.sqrt(mesh.area / target))
+    reasons: list[str] = []
+    rough: list[tuple[float, _Mapped, str]] = []  # of another count than asked for
+    done: list[tuple[int, _Mapped, QuadMesh, str]] = []
+    for attempt in _ATTEMPTS:
+        creases = attempt.creases(mesh, given, angle, length)
+        try:
+            mapped = _by_map(mesh, field, creases, seam, target, attempt, watch, tell)
+        except (ParametrizationError, FieldError) as problem:
+            reasons.append(str(problem))
+            continue
+        made = mapped.quads.n_quads
+        miss = abs(np.log(made / target))
+        if miss > np.log(NEAR_COUNT) and abs(made - target) > slack:
+            rough.append((miss, mapped, attempt.name))
+            reasons.append(f"{made} quads where {target} were asked for")
+            continue
+        quads = _polished(mapped, surface, watch, tell)
+        folded = int((scaled_jacobians(quads) <= 0).any(axis=1).sum())
+        done.append((folded, mapped, quads, attempt.name))
+        if folded == 0 or len(done) == MOST_POLISHED:
+            break
+        reasons.append(f"{folded} quads stay folded")
+    if rough and not done:
+        _, mapped, name = min(rough, key=lambda found: found[0])
+        done.append((0, mapped, _polished(mapped, surface, watch, tell), name))
+    uv: UvMap | None = None
+    if done:
+        _, mapped, quads, method = min(done, key=lambda found: found[0])
+        aligning = mapped.aligned.report
+        singularities, cancelled = aligning.singularities, aligning.pairs_cancelled
+        if with_uv:
+            with watch("integer-grid map"):
+                uv = mapped.uv()
+    else:
+        with watch("fallback"):
+            quads = triangles_to_quads(mesh, target, angle=field.angle)
+        method, singularities, cancelled = PAIRED, {}, 0
+    tell("done", 1.0)
+    report = ComponentReport(
+        vertices=mesh.n_vertices,
+        faces=mesh.n_faces,
+        target=target,
+        made=quads.n_quads,
+        method=method,
+        reason="" if method == MAP else "; ".join(dict.fromkeys(reasons)),
+        singularities=singularities,
+        cancelled=cancelled,
+        seconds=dict(watch.seconds),
+    )
+    return Part(quads, report, uv)
+
+
+def _by_map(
+    mesh: TriMesh,
+    field: CrossField,
+    creases: Ints,
+    seam: Bools | None,
+    target: int,
+    attempt: _Attempt,
+    watch: Watch,
+    tell: Progress,
+) -> _Mapped:
+    """Quads by an integer-grid map, their vertices where the map has them.
+
+    Raises
+    ------
+    ParametrizationError, FieldError
+        If there is no valid map, or its quads are not a valid mesh of the input's topology.
+    """
+    tell("align the field", 0.0)
+    length = float(np.sqrt(mesh.area / target))
+    with watch("align"):
+        settings = AlignSettings(edge_length=length, smoothing=attempt.smoothing)
+        aligned = align_field(mesh, field, creases, settings, seam)
+    tell("map", 0.15)
+    with watch("map"):
+        seamless = solve_seamless_map(aligned)
+    if not seamless.is_valid:
+        raise ParametrizationError(
+            f"{seamless.flips} triangles of the map stay folded after {seamless.solves} solves"
+        )
+    tell("quantise", 0.5)
+    with watch("quantise"):
+        tracing = trace(aligned, seamless)
+        tmesh = build_tmesh(aligned, seamless, tracing)
+        layout = quantise(tmesh, target, seamless.area).layout
+    tell("lay out", 0.7)
+    with watch("lay out"):
+        vertices = embed_layout(layout, aligned, seamless)
+    quads = QuadMesh(vertices, layout.quads)
+    _require_topology(quads, mesh)
+    return _Mapped(quads, aligned, seamless, tracing, layout)
+
+
+def _polished(mapped: _Mapped, surface: ClosestPoints, watch: Watch, tell: Progress) -> QuadMesh:
+    """The quads with their vertices moved on the surface to even shapes and sizes."""
+    tell("polish", 0.75)
+    quads = mapped.quads
+    with watch("polish"):
+        fixed, curves = _constraints(mapped.layout)
+        moved = smooth_quads(quads.vertices, quads.quads, surface, fixed, curves, loosen=True)
+    return QuadMesh(moved, quads.quads)
+
+
+def _require_topology(quads: QuadMesh, mesh: TriMesh) -> None:
+    if not quads.is_manifold or len(quads.degenerate_quads):
+        raise ParametrizationError("the quads of the map do not form a manifold")
+    made, wanted = MeshCounts.of(quads).topology, MeshCounts.of(mesh).topology
+    if made != wanted:
+        raise ParametrizationError(
+            f"the quads of the map have (components, Euler characteristic, boundary loops) {made} "
+            f"instead of {wanted}"
+        )
+
+
+def _constraints(layout: Layout) -> tuple[NDArray[np.bool_], CurveConstraints]:
+    """Vertices that the polish must not move, and the feature curves on which others slide."""
+    tmesh = layout.tmesh
+    curve = np.full(layout.n_vertices, -1, dtype=np.int64)
+    on = np.flatnonzero(tmesh.node_feature >= 0)
+    curve[layout.vertex_of[on]] = tmesh.node_feature[on]
+    for a, arc in enumerate(tmesh.arcs):
+        if arc.feature >= 0:
+            curve[layout.vertex_of[layout.half_arc_points(2 * a)]] = arc.feature
+    fixed = np.zeros(layout.n_vertices, dtype=bool)
+    fixed[layout.vertex_of[np.flatnonzero(tmesh.node_fixed)]] = True
+    curve[fixed] = -1
+    closed = [bool(np.array_equal(c[0], c[-1])) for c in tmesh.curves]
+    lines = [c[:-1] if loop else c for c, loop in zip(tmesh.curves, closed, strict=True)]
+    return fixed, CurveConstraints(lines, closed, curve)
