@@ -77,6 +77,11 @@ def folds(run: Result) -> float:
     return float(figures["folded"] + (figures["flipped"] or 0))
 
 
+def folded(run: Result) -> float:
+    """Quads folded against their own normal; thin parts cannot blur that."""
+    return float(figures_of(run)["folded"])
+
+
 def fallbacks(run: Result) -> float:
     """Components that needed more than the first fallback."""
     return sum(part["method"] not in FIRST for part in run["parts"])
@@ -120,6 +125,7 @@ def dense(run: Result) -> bool:
 BARS = (
     Bar("all quads, manifold, the input's topology (faults)", 1.0, lambda r: True, faults, 0),
     Bar("2,000 and 8,000: no quad folded or turned over (quads)", 0.95, dense, folds, 0),
+    Bar("2,000 and 8,000: of these, no quad folded (quads)", 0.95, dense, folded, 0),
     Bar("2,000 and 8,000: never more than 2 of them (quads)", 1.0, dense, folds, 2),
     Bar(
         "2,000 and 8,000: at most the first fallback (components)",
