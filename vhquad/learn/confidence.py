@@ -1,13 +1,12 @@
 """How far a prediction can be trusted, from what the network says of a shape and its mirror image.
 
 The two answers, seen in the same frames, agree within a degree or two on shapes like those that the
-network was trained on, and drift apart on others: mean cos of the difference 0.98 on whole unseen
-heads, 0.5 to 0.85 on animals and busts that it does not know. Agreement costs nothing, since both
-answers are there. Other small changes (fewer eigenvectors, features and times as of a cropped or
-extended shape, features left out) told the same story less clearly.
+network was trained on, and drift apart on others. Agreement costs nothing, since both answers are
+there. (Other small changes, as fewer eigenvectors, features and times as of a cropped or extended
+shape, features left out, told the same story less clearly of an earlier model.)
 
-The constants are fitted to the shipped model on half of its held-out heads and on shapes other than
-heads; see ``models/README.md`` for the figures on the rest.
+The constants are fitted to the shipped model by ``benchmarks/fit_confidence.py``, on validation
+heads and on two shapes other than heads; see ``models/README.md`` for the figures on others.
 """
 
 from __future__ import annotations
@@ -26,8 +25,8 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 LENGTH = 0.05  # the agreement is averaged over about this distance, in square roots of the area
-SHAPE = 0.7  # how much the mean over the shape counts, against the vertex's own neighbourhood
-NONE, FULL = 0.7, 0.95  # agreement that earns no confidence, and all of it
+SHAPE = 0.5  # how much the mean over the shape counts, against the vertex's own neighbourhood
+NONE, FULL = 0.4, 0.95  # agreement that earns no confidence, and all of it
 POWER = 3  # a rise late and steep
 
 

@@ -113,7 +113,7 @@ PRESETS: dict[str, ModelSettings] = {
         channels=256, blocks=6, times=4, keep_input=False, dropout=0.5, head="paper", head_terms=0
     ),
     # What models/default.safetensors is: a quarter of the time a step, a third of the loss.
-    "starter": ModelSettings(hidden_layers=1),
+    "starter": ModelSettings(hidden_layers=1, in_channels=72, in_lines=6, features="local"),
 }
 
 
