@@ -115,6 +115,14 @@ def test_sizes_of_a_density() -> None:
     assert count == round(mesh.area / 0.2**2)
 
 
+def test_absurd_sizes_are_not_believed() -> None:
+    """Those of a barely trained model; a count that is asked for stands."""
+    mesh = icosphere(2)
+    field = CrossField("faces", np.ones(mesh.n_faces), np.full(mesh.n_faces, 1e-7))
+    assert wanted_sizes(mesh, field)[1] == 4000
+    assert wanted_sizes(mesh, field, target_quads=9000)[1] == 9000
+
+
 @pytest.mark.parametrize("bad", [0.0, -1.0, np.nan, np.inf])
 def test_unusable_densities(bad: float) -> None:
 

@@ -14,6 +14,7 @@ __all__ = ["SIZE_RANGE", "checked_density", "wanted_sizes"]
 Floats = NDArray[np.float64]
 
 DEFAULT_QUADS = 4000  # where neither a count nor a size is given
+MOST_A_FACE = 4.0  # quads; sizes that amount to more are not believed
 SIZE_RANGE = 8.0
 """Sizes of the field, and what a density makes of them, are kept within this factor of their
 middle."""
@@ -69,7 +70,8 @@ def wanted_sizes(
     density : (n,) float64, optional
         Positive; multiplies the quads per area at each vertex, after the adaptivity.
     target_quads, edge_length : optional
-        At most one of them: what all is scaled to.
+        At most one of them: what all is scaled to. With neither, the sizes of the field say, unless
+        they amount to more than four quads a face.
 
     Returns
     -------
@@ -98,8 +100,10 @@ def wanted_sizes(
         target = float(target_quads)
     elif edge_length is not None:
         target = mesh.area / edge_length**2
+    elif native is not None and native <= max(MOST_A_FACE * mesh.n_faces, DEFAULT_QUADS):
+        target = native
     else:
-        target = native if native is not None else float(DEFAULT_QUADS)
+        target = float(DEFAULT_QUADS)
     count = float((mesh.face_areas / size**2).sum())
     return size * np.sqrt(count / target), max(round(target), 1)
 
