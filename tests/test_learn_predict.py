@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import torch
 
-from tests.meshes import blob, icosphere, merge, moved, one_triangle
-from tests.nn_inputs import random_network, small_settings
+from tests.meshes import blob, disk, icosphere, merge, moved, one_triangle
+from tests.nn_inputs import LOCAL, random_network, small_settings
 from vhquad.errors import ConfigError, ModelError
 from vhquad.field.cross import CrossField
 from vhquad.geometry.frames import build_frames, from_3d, vertex_axes
@@ -127,6 +127,19 @@ def test_carrying_back_loses_little() -> None:
 def test_no_proxy_where_topology_would_change() -> None:
     """7. A mesh that is small already is used as it is."""
     assert make_proxy(blob(1), 500) is None
+
+
+def test_shapes_without_features_get_a_common_size() -> None:
+    """9. Curvature says nothing of a disk: without training sizes would be nearly 0."""
+    mesh = disk(8)
+    blank = Model(random_network(small_settings(**LOCAL), torch.float32))
+    with torch.no_grad():
+        for name, parameter in blank.network.named_parameters():
+            if name.endswith("bias"):
+                parameter.zero_()
+    size = predict_field(mesh, blank, cache=False).size
+    assert size is not None
+    np.testing.assert_allclose(size, 0.02 * np.sqrt(mesh.area), rtol=1e-5)
 
 
 def test_wrong_options_are_refused(model: Model) -> None:

@@ -25,6 +25,7 @@ from vhquad.learn.device import choose_device
 from vhquad.learn.proxy import carry_back, make_proxy
 from vhquad.mesh.triangle import TriMesh
 from vhquad.nn.checkpoint import Model, load_model
+from vhquad.nn.heads import LENGTH_UNIT
 from vhquad.nn.inputs import NetworkInput, network_input, unstack
 from vhquad.nn.network import VectorHeatNet
 from vhquad.nn.settings import ModelSettings
@@ -33,6 +34,7 @@ __all__ = ["PROXY_ABOVE", "Prediction", "Resolution", "predict_field", "predict_
 
 PROXY_ABOVE = 15_000  # vertices of a component
 PROXY_VERTICES = 10_000
+SMALLEST = 5e-4  # quad edge over sqrt(area): four million quads
 
 Resolution = Literal["auto", "full"]
 
@@ -154,9 +156,11 @@ def predict_input(network: VectorHeatNet, mesh: NetworkInput) -> Prediction:
     network.eval()
     with torch.inference_mode():
         own, other = network(mesh), network(mesh.mirror_image())
-    size = torch.sqrt(own.size * other.size).cpu().double().numpy() * mesh.length
+    size = torch.sqrt(own.size * other.size).cpu().double().numpy()
+    # A sphere has no features, and an untrained network then no size either: take a common one.
+    size = np.where(size > SMALLEST, size, LENGTH_UNIT) * mesh.length
     z, mirrored = unstack(own.z), unstack(other.z)
-    return Prediction(0.5 * (z + mirrored), np.asarray(size), agreement(z, mirrored))
+    return Prediction(0.5 * (z + mirrored), size, agreement(z, mirrored))
 
 
 def operator_settings(settings: ModelSettings) -> OperatorSettings:

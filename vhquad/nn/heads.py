@@ -16,7 +16,7 @@ from torch import Tensor, nn
 
 from vhquad.nn.layers import VectorLinear
 
-__all__ = ["MixedHead", "PaperHead", "complex_power"]
+__all__ = ["LENGTH_UNIT", "MixedHead", "PaperHead", "complex_power"]
 
 EPSILON = 1e-6  # softens v / |v| at 0; outputs are of the order of 1
 LENGTH_UNIT = 0.02  # quad edge over sqrt(area) of about 2500 quads, so that |v| is about 1
