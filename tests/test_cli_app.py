@@ -58,7 +58,7 @@ def fail_with(error: BaseException, monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(path: object) -> None:
         raise error
 
-    monkeypatch.setattr(api, "load", broken)
+    monkeypatch.setattr(api, "load_kept", broken)
 
 
 def test_unexpected_error_is_one_line(invoke: Invoke, monkeypatch: pytest.MonkeyPatch) -> None:
