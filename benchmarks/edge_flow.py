@@ -45,6 +45,7 @@ class Artist:
     def angles(self, quads: QuadMesh) -> Floats:
         """Degrees between each edge and the cross beneath its middle, 0 to 45; (e,)."""
         ends = quads.vertices[quads.edges]
+        ends = ends[(ends[:, 0] != ends[:, 1]).any(axis=1)]
         hits = self.surface.query(ends.mean(axis=1))
         x, y = hits.interpolate(self.square).T[:, :, None]
         a, b, c, d = self.mesh.vertices[self.mesh.quads[self.quad[hits.face]]].transpose(1, 0, 2)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import signal
+import sys
 import time
 from pathlib import Path
 
@@ -52,14 +53,34 @@ def test_quads_to_model_to_field(invoke: Invoke, folder: Path, tmp_path: Path) -
     assert source.with_suffix(".ffield").exists()
 
 
+def test_a_folder_of_meshes_is_prepared_on_the_way(
+    invoke: Invoke, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Into the run, which resumes from it; what cannot be used is named."""
+    monkeypatch.setattr(sys.modules["vhquad.cli.train"], "FEW_SAMPLES", 6)
+    (folder / "plain.obj").unlink()
+    run = folder.parent / "mine"
+    first = invoke("train", folder, "--init", "default", "--steps", "2", "--out", run)
+    assert first.code == 0
+    assert "rubbish.obj" in first.err
+    samples = json.loads((run / "dataset" / "0" / "index.json").read_text())["samples"]
+    assert {s["source"] for s in samples} == {"torus.obj", "ball.obj"}
+    assert len(samples) == 4  # six over three files: two of each
+    assert {s["split"] for s in samples} == {"train"}
+    again = invoke("train", folder, "--resume", "--out", run)
+    assert again.code == 0
+    assert "rubbish.obj" not in again.err
+
+
 def test_refusals(invoke: Invoke, tmp_path: Path) -> None:
     empty = tmp_path / "empty"
     empty.mkdir()
     assert invoke("preprocess", empty).refused("empty", "no mesh")
+    assert invoke("train", empty).refused("empty", "no mesh")
     assert invoke("preprocess", tmp_path / "no").refused("no")
     assert invoke("preprocess", empty, "--out", empty).refused("--out")
     assert invoke("preprocess", empty, "--val", "2").refused("--val")
-    assert invoke("train", empty).refused("vhquad preprocess")
+    assert invoke("train", tmp_path / "no").refused("vhquad preprocess")
     assert invoke("train", empty, "--steps", "1", "--epochs", "1").refused("--steps or --epochs")
     assert invoke("train", empty, "--init", "default", "--preset", "paper").refused("--init")
     assert invoke("train", empty, "--preset", "huge").refused("huge", "starter")

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vhquad.cli.guard import Shell, complain, guarded
+from vhquad.cli.folders import holds_meshes, prepare
+from vhquad.cli.guard import Shell, guarded
 from vhquad.cli.options import Device
 from vhquad.cli.outputs import check_folder, check_outputs, json_file
 from vhquad.errors import ConfigError
@@ -113,19 +114,7 @@ def _prepared(folders: list[Path], model: Model, progress: Progress) -> Iterator
     """Datasets as they are, and folders of meshes as datasets that last as long as the context."""
     from tempfile import TemporaryDirectory
 
-    with TemporaryDirectory(prefix="vhquad-") as scratch:
-        yield [
-            _prepare(folder, Path(scratch) / f"{place}", model, progress)
-            if folder.is_dir() and not (folder / "index.json").exists()
-            else folder
-            for place, folder in enumerate(folders)
-        ]
-
-
-def _prepare(folder: Path, out: Path, model: Model, progress: Progress) -> Path:
-    import os
-
-    from vhquad.learn.preprocess import PreprocessSettings, preprocess
+    from vhquad.learn.samples import PreprocessSettings
 
     settings = PreprocessSettings(
         triangulations=1,
@@ -135,11 +124,10 @@ def _prepare(folder: Path, out: Path, model: Model, progress: Progress) -> Path:
         turned=model.settings.turned,
         k=model.settings.k,
     )
-
-    def on_source(name: str, done: int, count: int) -> None:
-        progress(f"preparing {folder}", done / count, f"{done} of {count}, last {name}")
-
-    dataset = preprocess(folder, out, settings, os.cpu_count() or 1, on_source)
-    for source, reason in dataset.skipped:
-        complain(f"skipped {source}: {reason}")
-    return out
+    with TemporaryDirectory(prefix="vhquad-") as scratch:
+        yield [
+            prepare(folder, Path(scratch) / f"{place}", settings, progress)
+            if holds_meshes(folder)
+            else folder
+            for place, folder in enumerate(folders)
+        ]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from vhquad.cli.folders import holds_meshes, prepare
 from vhquad.cli.guard import Shell, complain, guarded
 from vhquad.cli.options import Device
 from vhquad.cli.outputs import check_folder
@@ -15,9 +16,12 @@ from vhquad.errors import ConfigError
 if TYPE_CHECKING:
     from vhquad.cli.progress import Progress
     from vhquad.learn.runstate import Record
-    from vhquad.learn.schedule import TrainSettings
 
 __all__ = ["train"]
+
+FEW_SAMPLES = 60  # of a folder of meshes, at least
+MOST_OF_ONE = 20  # mesh
+FEWEST_TO_SPLIT = 10  # meshes: with fewer, all are for training
 
 
 @guarded
@@ -27,7 +31,8 @@ def train(
         list[Path],
         typer.Argument(
             metavar="DATASET",
-            help="Made by `vhquad preprocess`; several are mixed.",
+            help="Made by `vhquad preprocess`, or a folder of quad meshes, which is then prepared "
+            "first; several are mixed.",
             show_default=False,
         ),
     ],
@@ -98,7 +103,11 @@ def train(
         ),
     ] = None,
 ) -> None:
-    """Train a Vector Heat Network on a dataset.
+    """Train a Vector Heat Network on a dataset, or on a folder of quad meshes.
+
+    A folder of meshes is prepared into RUN/dataset: about 60 samples in all at least, whole,
+    deformed and cropped; `vhquad preprocess` makes them to your measure. With `--init default` a
+    handful of your meshes teaches the shipped model your style.
 
     Ctrl-C stops with a checkpoint; `--resume` goes on from it and arrives at the same losses as an
     uninterrupted run.
@@ -114,16 +123,27 @@ def train(
     from vhquad.cli.show import show_training
 
     with Progress(shell.quiet, "loading libraries") as progress:
+        from vhquad.learn.schedule import TrainSettings
         from vhquad.learn.train import train as run_training
         from vhquad.nn.settings import preset as model_preset
 
-        given = {"rate": rate, "precision": precision, "seed": seed}
-        given["steps"] = steps if epochs is None else _steps_of(epochs, datasets)
-        settings = _settings({k: v for k, v in given.items() if v is not None}, resume)
+        given = {"rate": rate, "precision": precision, "seed": seed, "steps": steps}
+        if resume:
+            _refuse({**given, "epochs": epochs})
+        ready = [
+            _prepared(folder, run / "dataset" / f"{place}", init, preset, progress)
+            if holds_meshes(folder)
+            else folder
+            for place, folder in enumerate(datasets)
+        ]
+        if epochs is not None:
+            given["steps"] = _steps_of(epochs, ready)
+        chosen = {name: value for name, value in given.items() if value is not None}
+        settings = None if resume else TrainSettings.from_dict(chosen)
         model = None if preset is None else model_preset(preset)
         try:
             result = run_training(
-                list(datasets),
+                ready,
                 run,
                 settings,
                 model,
@@ -139,16 +159,35 @@ def train(
     show_training(shell, run, result)
 
 
-def _settings(given: dict[str, object], resume: bool) -> TrainSettings | None:
-    """The settings, or None to take those of the run that is resumed."""
-    from vhquad.learn.schedule import TrainSettings
+def _prepared(
+    folder: Path, out: Path, init: str | None, preset: str | None, progress: Progress
+) -> Path:
+    """A dataset of a folder's meshes, with the features that the model to be trained takes."""
+    from vhquad.learn.preprocess import MESH_SUFFIXES, PreprocessSettings
+    from vhquad.nn.checkpoint import load_model
+    from vhquad.nn.settings import preset as model_preset
 
-    if resume:
-        if given:
-            names = ", ".join(f"--{name}" for name in sorted(given))
-            raise ConfigError(f"--resume goes on with the run's own settings; leave out {names}")
-        return None
-    return TrainSettings.from_dict(given)
+    if (out / "index.json").exists():  # of the run that is resumed
+        return out
+    model = model_preset(preset or "starter") if init is None else load_model(init).settings
+    count = sum(path.suffix.lower() in MESH_SUFFIXES for path in folder.rglob("*"))
+    settings = PreprocessSettings(
+        triangulations=min(max(FEW_SAMPLES // max(count, 1), 2), MOST_OF_ONE),
+        crops=0.5,
+        deform=0.5,
+        val=0.0 if count < FEWEST_TO_SPLIT else 0.1,
+        features=model.features,
+        turned=model.turned,
+        k=model.k,
+    )
+    return prepare(folder, out, settings, progress)
+
+
+def _refuse(given: dict[str, object]) -> None:
+    """Raise if a run that is resumed is given settings of its own."""
+    names = ", ".join(f"--{name}" for name in sorted(given) if given[name] is not None)
+    if names:
+        raise ConfigError(f"--resume goes on with the run's own settings; leave out {names}")
 
 
 def _steps_of(epochs: float, datasets: list[Path]) -> int:
