@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, diags_array
-from scipy.sparse.linalg import splu
 
 from vhquad.geometry.delaunay import IntrinsicTriangulation
+from vhquad.geometry.sparse import PositiveFactor
 
 __all__ = [
     "connection_laplacian",
@@ -114,6 +114,5 @@ def diffuse(laplacian: csr_matrix, mass: Floats, time: float, u: NDArray) -> NDA
     """
     weight = mass.reshape((-1,) + (1,) * (u.ndim - 1))
     dtype = np.result_type(laplacian.dtype, u.dtype)
-    system = (diags_array(mass) + time * laplacian).astype(dtype).tocsc()
-    factor = splu(system, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-    return factor.solve((weight * u).astype(dtype))
+    system = (diags_array(mass) + time * laplacian).astype(dtype)
+    return PositiveFactor(system).solve((weight * u).astype(dtype))

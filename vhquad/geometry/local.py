@@ -23,7 +23,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, diags_array
-from scipy.sparse.linalg import splu
 
 from vhquad.geometry.curvature import angle_defect, dihedral_angles
 from vhquad.geometry.delaunay import IntrinsicTriangulation
@@ -34,6 +33,7 @@ from vhquad.geometry.laplacian import (
     gradient_operator,
     lumped_mass,
 )
+from vhquad.geometry.sparse import PositiveFactor
 from vhquad.mesh.triangle import TriMesh
 
 __all__ = ["RADII", "LocalCurvature", "local_curvature", "local_lines", "local_vectors"]
@@ -147,13 +147,8 @@ def _compressed(x: Complexes) -> Complexes:
 
 def _smoother(laplacian: csr_matrix, mass: Floats, time: float) -> Callable[[NDArray], NDArray]:
     """Heat diffusion for a time, in ``STEPS`` implicit Euler steps of one factorisation."""
-    system = (diags_array(mass) + time / STEPS * laplacian).tocsc()
-    factor = splu(
-        system,
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
-    )
+    system = diags_array(mass) + time / STEPS * laplacian
+    factor = PositiveFactor(system)
 
     def smooth(u: NDArray) -> NDArray:
         weight = mass.reshape((-1,) + (1,) * (u.ndim - 1))

@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.sparse import csr_matrix, diags_array
-from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
+from scipy.sparse.linalg import LinearOperator, eigsh
+
+from vhquad.geometry.sparse import PositiveFactor
 
 __all__ = ["Spectrum", "smallest_eigenpairs"]
 
@@ -79,15 +81,10 @@ def smallest_eigenpairs(
     return Spectrum(unit * np.maximum(values, 0.0), vectors / root[:, None])
 
 
-def _factor(standard: csr_matrix, dtype: np.dtype) -> SuperLU:
+def _factor(standard: csr_matrix, dtype: np.dtype) -> PositiveFactor:
     """Factors of the matrix shifted to be positive definite."""
     shifted = (standard + _SHIFT * diags_array(np.ones(standard.shape[0]))).astype(dtype)
-    return splu(
-        shifted.tocsc(),
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
-    )
+    return PositiveFactor(shifted)
 
 
 def _arpack(standard: csr_matrix, k: int) -> tuple[NDArray, NDArray]:

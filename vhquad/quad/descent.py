@@ -12,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, diags_array
-from scipy.sparse.linalg import SuperLU, splu
 
+from vhquad.geometry.sparse import PositiveFactor
 from vhquad.quad.distortion import cross, distortion, unit
 from vhquad.quad.sliding import (
     SIZE_WEIGHT,
@@ -38,7 +38,7 @@ def better(a: State, b: State) -> bool:
     return (int(a.folded.sum()), a.energy) < (int(b.folded.sum()), b.energy)
 
 
-def spread(problem: Problem, state: State, factor: SuperLU, iterations: int) -> State:
+def spread(problem: Problem, state: State, factor: PositiveFactor, iterations: int) -> State:
     """Move vertices so that quads come near their own best-fitting squares; the last state."""
     quads = problem.quads
     low, high = SQUARE_RANGE[0] * problem.size, SQUARE_RANGE[1] * problem.size
@@ -73,7 +73,7 @@ def _longest(problem: Problem, move: Floats) -> float:
     return float((np.linalg.norm(move, axis=1) / problem.reach)[~problem.fixed].max())
 
 
-def laplacian_factor(problem: Problem) -> SuperLU:
+def laplacian_factor(problem: Problem) -> PositiveFactor:
     """Factor of the graph Laplacian (weights 1/size², a 1 % mass) over the vertices that move."""
     n = len(problem.fixed)
     free = np.flatnonzero(~problem.fixed)
@@ -83,16 +83,11 @@ def laplacian_factor(problem: Problem) -> SuperLU:
     half = coo_matrix((weight, (tail, head)), shape=(n, n)).tocsr()
     adjacency = half + half.T
     degree = np.asarray(adjacency.sum(axis=1)).reshape(-1)
-    laplacian = (diags_array(1.01 * degree) - adjacency).tocsr()[free][:, free].tocsc()
-    return splu(
-        laplacian,
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
-    )
+    laplacian = (diags_array(1.01 * degree) - adjacency).tocsr()[free][:, free]
+    return PositiveFactor(laplacian)
 
 
-def _solve(problem: Problem, factor: SuperLU, a: Floats) -> Floats:
+def _solve(problem: Problem, factor: PositiveFactor, a: Floats) -> Floats:
     """Inverse Laplacian of vectors at the vertices, 0 where fixed."""
     out = np.zeros_like(a)
     free = ~problem.fixed
@@ -107,7 +102,7 @@ def _epsilon(area: Floats) -> float:
 
 
 def descend(
-    problem: Problem, state: State, factor: SuperLU, iterations: int, patience: int = 0
+    problem: Problem, state: State, factor: PositiveFactor, iterations: int, patience: int = 0
 ) -> State:
     """Minimise the barrier energy.
 
@@ -115,7 +110,7 @@ def descend(
     ----------
     problem, state
         What to solve, and where to start.
-    factor : SuperLU
+    factor : PositiveFactor
         Of :func:`laplacian_factor`.
     iterations : int
         Steps. After them it goes on while quads are folded, as long as ``patience`` steps have
@@ -171,7 +166,7 @@ def descend(
 
 
 def _two_loop(
-    problem: Problem, gradient: Floats, history: list[tuple[Floats, Floats]], factor: SuperLU
+    problem: Problem, gradient: Floats, history: list[tuple[Floats, Floats]], factor: PositiveFactor
 ) -> Floats:
     """L-BFGS inverse Hessian times the gradient, the factored Laplacian in the middle."""
     q = gradient.copy()

@@ -12,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_matrix, csr_matrix, diags_array
-from scipy.sparse.linalg import splu
 
+from vhquad.geometry.sparse import PositiveFactor
 from vhquad.mesh.triangle import TriMesh
 
 __all__ = ["MapEnergy", "largest_step"]
@@ -137,11 +137,4 @@ def largest_step(frames: Floats, move: Floats) -> float:
 
 def solve_positive(matrix: csr_matrix, right: Floats) -> Floats:
     """Solution of a symmetric positive definite system."""
-    return np.asarray(
-        splu(
-            matrix.tocsc(),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        ).solve(right)
-    )
+    return PositiveFactor(matrix).solve(right)

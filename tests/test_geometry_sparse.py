@@ -1,0 +1,33 @@
+"""Factors of positive definite matrices against dense solutions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_matrix, diags_array
+
+from tests.meshes import icosphere
+from vhquad.geometry.delaunay import intrinsic_delaunay
+from vhquad.geometry.frames import build_frames
+from vhquad.geometry.laplacian import connection_laplacian, cotan_laplacian
+from vhquad.geometry.sparse import PositiveFactor
+
+
+@pytest.mark.parametrize("order", [0, 1])
+@pytest.mark.parametrize("columns", [None, 3])
+def test_inverse_of_a_shifted_laplacian(
+    order: int, columns: int | None, rng: np.random.Generator
+) -> None:
+    """Scalar and connection Laplacian, one right-hand side and several."""
+    mesh = icosphere(2)
+    tri = intrinsic_delaunay(mesh, build_frames(mesh))
+    laplacian = connection_laplacian(tri, order=1) if order else cotan_laplacian(tri)
+    matrix = csr_matrix(laplacian + 0.1 * diags_array(np.ones(mesh.n_vertices)))
+    shape = (mesh.n_vertices,) if columns is None else (mesh.n_vertices, columns)
+    right = rng.normal(size=shape).astype(matrix.dtype)
+    expected = np.linalg.solve(matrix.toarray(), right)
+    np.testing.assert_allclose(PositiveFactor(matrix).solve(right), expected, atol=1e-10)
+    single = np.complex64 if order else np.float32
+    found = PositiveFactor(matrix.astype(single)).solve(right.astype(single))
+    assert found.dtype == single
+    np.testing.assert_allclose(found, expected, atol=1e-3)

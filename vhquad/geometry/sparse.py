@@ -1,0 +1,43 @@
+"""Factors of sparse positive definite matrices, by SuperLU with minimum degree ordering."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csc_matrix
+from scipy.sparse.linalg import splu
+
+__all__ = ["PositiveFactor"]
+
+
+class PositiveFactor:
+    """Factor of a symmetric or Hermitian positive definite matrix; ``solve`` applies the inverse.
+
+    Rows are shuffled first: in the order of a regularly subdivided mesh, minimum degree may take
+    minutes where it takes a second in any other.
+
+    Parameters
+    ----------
+    matrix : (n, n) sparse
+        Real or complex, single or double precision.
+    """
+
+    def __init__(self, matrix: Any) -> None:
+        self._order = np.random.default_rng(0).permutation(matrix.shape[0])
+        shuffled = matrix.tocsr()[self._order][:, self._order]
+        # Without pivoting the ordering holds, and the factor stays sparse.
+        self._factor = splu(
+            csc_matrix(shuffled),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+
+    def solve(self, right: NDArray[Any]) -> NDArray[Any]:
+        """The matrix's inverse times a vector (n,) or some columns (n, c)."""
+        found = self._factor.solve(np.ascontiguousarray(right[self._order]))
+        out = np.zeros_like(found)
+        out[self._order] = found
+        return out
