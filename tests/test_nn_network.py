@@ -61,7 +61,8 @@ def test_tangent_bases_do_not_matter(
     z, size = answer(network, as_input(o, dtype))
     z2, size2 = answer(network, as_input(turned, dtype))
     assert np.abs(z2 - z * turn**order).max() < tolerance
-    np.testing.assert_allclose(size2, size, rtol=tolerance)
+    # Sizes near 0 are lengths of vectors that cancel: their rounding is that of typical ones.
+    np.testing.assert_allclose(size2, size, rtol=tolerance, atol=0.1 * tolerance * size.mean())
 
 
 def test_eigenvector_phases_do_not_matter(rng: np.random.Generator) -> None:
