@@ -34,13 +34,15 @@ from vhquad.learn.targets import isotropic_remesh, split_quads
 
 HEAD_PARTS = re.compile(r"^(head|forehead|eyebrows|mouth|nose|chin|neck|(l|r)-(eye|ear|cheek))-")
 SIDES = (("l-", "r-"), ("Left", "Right"))
-MOST_SELF_INTERSECTIONS = 150  # triangles
 SCAN_IDENTITY = 1_000_000  # never reached by --count
 SCAN_VERTICES = 13_000
 
 
 class HeadMaker:
     """Draws heads: ``draw(identity)`` gives the same vertices and quads for the same identity."""
+
+    kind = "head"
+    most_self_intersections = 150  # triangles
 
     def __init__(self, seed: int = 0) -> None:
         self.seed = seed
@@ -63,7 +65,7 @@ class HeadMaker:
         skin = bool(rng.random() < 0.4) if skin_only is None else skin_only
         while True:
             vertices = self._vertices(rng)
-            if self_intersections(vertices, self.quads) <= MOST_SELF_INTERSECTIONS:
+            if self_intersections(vertices, self.quads) <= self.most_self_intersections:
                 break
         used, quads = np.unique(self.quads[self.skin if skin else slice(None)], return_inverse=True)
         return vertices[used], quads.reshape(-1, 4).astype(np.int64), "skin" if skin else "full"
@@ -90,9 +92,16 @@ class HeadMaker:
                 actions[str(other)] = strength
         with torch.no_grad():
             output = self.model(
-                phenotype_kwargs=phenotype, local_changes_kwargs=local, facial_actions=actions
+                pose_parameters=self._pose(rng),
+                phenotype_kwargs=phenotype,
+                local_changes_kwargs=local,
+                facial_actions=actions,
             )
         return np.asarray(output["vertices"][0], dtype=np.float64)
+
+    def _pose(self, rng: np.random.Generator) -> dict[str, torch.Tensor] | None:
+        """Turns of the joints, (1, 4, 4) each; a head has none."""
+        return None
 
 
 def self_intersections(vertices: NDArray[np.float64], quads: NDArray[np.int64]) -> int:
@@ -106,7 +115,7 @@ def self_intersections(vertices: NDArray[np.float64], quads: NDArray[np.int64]) 
 
 def write_obj(path: Path, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
     """Write positions (seven decimals) and faces; the file appears whole or not at all."""
-    lines = ["# random head, anny (MakeHuman shapes), CC0 1.0"]
+    lines = ["# random person, anny (MakeHuman shapes), CC0 1.0"]
     lines += [f"v {x:.7f} {y:.7f} {z:.7f}" for x, y, z in vertices]
     lines += ["f " + " ".join(map(str, face)) for face in (faces + 1).tolist()]
     partial = path.with_suffix(".partial")
@@ -114,13 +123,12 @@ def write_obj(path: Path, vertices: NDArray[np.float64], faces: NDArray[np.int64
     partial.replace(path)
 
 
-def make_set(folder: Path, count: int, seed: int) -> None:
-    """Write ``count`` heads and the split into ``folder``; heads that are there are kept."""
+def make_set(folder: Path, count: int, maker: HeadMaker) -> None:
+    """Write ``count`` people and the split into ``folder``; files that are there are kept."""
     folder.mkdir(parents=True, exist_ok=True)
-    maker = HeadMaker(seed)
     split = {}
     for identity in range(count):
-        name = f"head_{identity:04d}"
+        name = f"{maker.kind}_{identity:04d}"
         place = identity % 15
         split[name] = {3: "val", 7: "test", 12: "test"}.get(place, "train")
         path = folder / f"{name}.obj"
@@ -149,7 +157,7 @@ def main() -> None:
     if arguments.scan:
         make_scan(arguments.scan, arguments.seed)
     if arguments.folder:
-        make_set(arguments.folder, arguments.count, arguments.seed)
+        make_set(arguments.folder, arguments.count, HeadMaker(arguments.seed))
     if not (arguments.scan or arguments.folder):
         parser.error("give a folder, or --scan FILE")
 
