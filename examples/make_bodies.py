@@ -21,7 +21,6 @@ import numpy as np
 import torch
 from anny.face_segmentation import get_face_segmentation_mask
 from make_heads import HeadMaker, make_set
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 JOINTS = re.compile(r"^(upperleg01|lowerleg01|upperarm01|lowerarm01|spine0[1-5]|neck01|head)")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests import meshes
-from vhquad import api
+from vhquad import api, cache
 from vhquad.cache import code_digest, content_key, read_arrays, write_arrays
 from vhquad.mesh.triangle import TriMesh
 
@@ -94,3 +95,23 @@ def test_fields_are_predicted_once(
     entry.write_bytes(whole[: len(whole) // 2])
     again = api.predict(mesh, weights)
     assert np.array_equal(first.z, again.z)
+
+
+def test_what_was_used_longest_ago_goes_and_nothing_that_is_not_ours(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    block = {"a": np.zeros(1000)}  # 8 kB and a header
+    other = tmp_path / "measurements.npz"
+    np.savez(other, a=np.zeros(5000))
+    paths = [tmp_path / f"{'mesh-' * (i % 2)}{content_key(i)}.npz" for i in range(4)]
+    for age, path in enumerate(paths[:3]):
+        write_arrays(path, block)
+        os.utime(path, (1e9 + age, 1e9 + age))
+    assert read_arrays(paths[0], ("a",)) is not None  # the oldest is used again
+    monkeypatch.setattr(cache, "MOST_BYTES", 3 * paths[0].stat().st_size)
+    write_arrays(paths[3], block)
+    assert [path.exists() for path in paths] == [True, False, True, True]
+    assert other.exists()
+    monkeypatch.setattr(cache, "MOST_BYTES", 0)
+    write_arrays(paths[1], block)
+    assert [path.exists() for path in paths] == [False, True, False, False]  # the newest stays

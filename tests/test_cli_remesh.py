@@ -11,8 +11,8 @@ import pytest
 
 from tests.command_line import Invoke, write_obj
 from tests.meshes import icosphere, several_broken_parts, torus, two_spheres, unwelded
-from vhquad import api
 from vhquad.mesh.io import read_quad_mesh
+from vhquad.quad import remeshing
 from vhquad.report import RemeshReport
 
 FAST = ("--method", "curvature", "--target-quads", "120")
@@ -285,7 +285,7 @@ def test_an_older_result_survives_a_failure(
     def broken(*args: object, **kwargs: object) -> None:
         raise RuntimeError("half way")
 
-    monkeypatch.setattr(api, "remesh_with", broken)
+    monkeypatch.setattr(remeshing, "remesh_predicted", broken)
     assert invoke("remesh", ring, "--out", out, *FAST).code == 1
     assert out.read_text(encoding="ascii") == "precious"
 

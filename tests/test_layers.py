@@ -18,6 +18,7 @@ LEVELS = {
     "atomic": 0,
     "cache": 1,
     "jsonable": 1,
+    "watch": 1,
     "mesh": 2,
     "report": 3,
     "geometry": 3,

@@ -11,8 +11,9 @@ from tests import meshes
 from vhquad import api
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.triangle import TriMesh
-from vhquad.quad import stand_in
+from vhquad.quad import remeshing, stand_in
 from vhquad.quad.pipeline import RemeshSettings
+from vhquad.quad.remeshing import remesh_predicted
 from vhquad.quad.stand_in import StandIn, make_stand_in
 
 
@@ -157,7 +158,7 @@ def test_no_stand_in_where_the_mesh_itself_is_wanted(
 ) -> None:
     mesh = meshes.icosphere(4)
     monkeypatch.setattr(stand_in, "FEWEST_FACES", 1000)
-    made = api.remesh_predicted(
+    made = remesh_predicted(
         mesh,
         lambda surface: api.predict(surface, method="curvature"),
         RemeshSettings(target_quads=100, symmetry="x" if why == "symmetry" else "off"),
@@ -173,7 +174,7 @@ def test_what_cannot_be_mapped_on_a_stand_in_is_done_again(
 ) -> None:
     mesh = meshes.icosphere(4)
     monkeypatch.setattr(stand_in, "FEWEST_FACES", 1000)
-    monkeypatch.setattr(api, "GUESSED_QUADS", 20)  # the field asks for far more
+    monkeypatch.setattr(remeshing, "GUESSED_QUADS", 20)  # the field asks for far more
     field_sizes = []
 
     def field_of(surface: TriMesh):  # type: ignore[no-untyped-def]
@@ -181,7 +182,7 @@ def test_what_cannot_be_mapped_on_a_stand_in_is_done_again(
         field = api.predict(surface, method="curvature")
         return type(field)(field.domain, field.z, np.full(len(field), 0.2), field.confidence)
 
-    made = api.remesh_predicted(mesh, field_of, RemeshSettings())
+    made = remesh_predicted(mesh, field_of, RemeshSettings())
     assert len(field_sizes) == 2
     assert made.mesh is mesh
     assert made.result.report.stand_in is None

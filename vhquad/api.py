@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -26,11 +24,11 @@ from vhquad.mesh.quality import check_quads
 from vhquad.mesh.repair import repair
 from vhquad.mesh.scalars import carried
 from vhquad.mesh.triangle import TriMesh
-from vhquad.quad.component import PAIRED
-from vhquad.quad.pipeline import RemeshResult, RemeshSettings, remesh_mesh
+from vhquad.quad.pipeline import RemeshResult, RemeshSettings
+from vhquad.quad.remeshing import remesh_predicted, remesh_with
 from vhquad.quad.sizing import SIZE_RANGE, checked_density
-from vhquad.quad.stand_in import StandIn, make_stand_in
 from vhquad.report import CheckReport, FieldReport, MeshCounts
+from vhquad.watch import Watch
 
 if TYPE_CHECKING:
     from vhquad.nn.checkpoint import Model
@@ -38,23 +36,17 @@ if TYPE_CHECKING:
 __all__ = [
     "LoadedMesh",
     "Method",
-    "Predicted",
     "check",
-    "clock",
     "describe_field",
     "load",
     "load_kept",
     "own_field",
     "predict",
     "remesh",
-    "remesh_predicted",
-    "remesh_with",
 ]
 
 Method = Literal["learned", "curvature"]
 Progress = Callable[[str, float], None]
-
-GUESSED_QUADS = 10_000  # where only the field will say; predicted sizes make fewer, as a rule
 
 
 def predict(
@@ -194,8 +186,8 @@ def remesh(
         symmetry=symmetry,
         seed=seed,
     )
-    seconds: dict[str, float] = {}
-    with clock(seconds, "repair"):
+    watch = Watch()
+    with watch("repair"):
         repaired = repair(vertices, faces)
     factor = None
     if density is not None:
@@ -203,7 +195,7 @@ def remesh(
         factor = carried(values, repaired.vertex_source, repaired.mesh)
     lines = repaired.report.lines()
     if field is not None:
-        with clock(seconds, "field"):
+        with watch("field"):
             cross = own_field(repaired.mesh, field)
         return remesh_with(
             repaired.mesh,
@@ -211,7 +203,7 @@ def remesh(
             settings,
             density=factor,
             repair_lines=lines,
-            seconds=seconds,
+            watch=watch,
             progress=progress,
         )
 
@@ -225,151 +217,10 @@ def remesh(
         density=factor,
         stand_in=resolution == "auto",
         repair_lines=lines,
-        seconds=seconds,
+        watch=watch,
         progress=progress,
     )
     return made.result
-
-
-@dataclass(frozen=True, eq=False)
-class Predicted:
-    """A remesh along a predicted field, and the field with the mesh it lives on."""
-
-    result: RemeshResult
-    field: CrossField
-    mesh: TriMesh
-    """The mesh itself, or its stand-in."""
-
-
-def remesh_predicted(
-    mesh: TriMesh,
-    field_of: Callable[[TriMesh], CrossField],
-    settings: RemeshSettings | None = None,
-    *,
-    creases: ArrayLike | None = None,
-    density: ArrayLike | None = None,
-    stand_in: bool = True,
-    cache: bool = True,
-    with_uv: bool = False,
-    repair_lines: Sequence[str] = (),
-    seconds: Mapping[str, float] | None = None,
-    progress: Progress | None = None,
-) -> Predicted:
-    """Predict a field and remesh by it, on a stand-in if the mesh is far finer than its quads.
-
-    Parameters
-    ----------
-    mesh : TriMesh
-    field_of : callable
-        Gives the cross field of a mesh.
-    stand_in : bool
-        Whether a decimated copy may take the place of the mesh. It never does where the map was
-        asked for or a symmetry, and if no map is found on it, all is done again on the mesh.
-    cache : bool
-        Keep the stand-in, and use one that was kept.
-
-    Other parameters are those of :func:`remesh_with`.
-    """
-    settings = settings or RemeshSettings()
-    spent = dict(seconds or {})
-    guess = GUESSED_QUADS
-    if settings.target_quads is not None:
-        guess = settings.target_quads
-    elif settings.edge_length is not None:
-        guess = max(1, round(mesh.area / settings.edge_length**2))
-    given = None if creases is None else np.asarray(creases, dtype=np.int64).reshape(-1, 2)
-    copy: StandIn | None = None
-    if stand_in and not with_uv and settings.symmetry == "off":
-        with clock(spent, "stand-in"):
-            copy = make_stand_in(mesh, guess, given, settings.crease, cache)
-    if copy is not None:
-        with clock(spent, "field"):
-            cross = field_of(copy.mesh)
-        result = remesh_with(
-            copy.mesh,
-            cross,
-            settings,
-            creases=copy.creases,
-            density=None if density is None else copy.carry(np.asarray(density, dtype=np.float64)),
-            onto=mesh,
-            repair_lines=repair_lines,
-            seconds=spent,
-            progress=progress,
-        )
-        report = result.report
-        if report.asked <= 2 * guess and all(p.method != PAIRED for p in report.components):
-            return Predicted(result, cross, copy.mesh)
-        spent = dict(report.seconds)
-    with clock(spent, "field"):
-        cross = field_of(mesh)
-    result = remesh_with(
-        mesh,
-        cross,
-        settings,
-        creases=given,
-        density=density,
-        with_uv=with_uv,
-        repair_lines=repair_lines,
-        seconds=spent,
-        progress=progress,
-    )
-    return Predicted(result, cross, mesh)
-
-
-def remesh_with(
-    mesh: TriMesh,
-    field: CrossField,
-    settings: RemeshSettings | None = None,
-    *,
-    creases: ArrayLike | None = None,
-    density: ArrayLike | None = None,
-    onto: TriMesh | None = None,
-    with_uv: bool = False,
-    repair_lines: Sequence[str] = (),
-    seconds: Mapping[str, float] | None = None,
-    progress: Progress | None = None,
-) -> RemeshResult:
-    """Remesh a sound mesh by a field, with what happened before in the report.
-
-    Parameters
-    ----------
-    mesh : TriMesh
-    field : CrossField
-        On its vertices or faces.
-    settings : RemeshSettings, optional
-    creases : (k, 2) array_like, optional
-        Vertex pairs of edges to keep, in place of those that the settings find.
-    density : (n,) array_like, optional
-        Factor on the quads per area at each vertex.
-    onto : TriMesh, optional
-        The surface that the mesh is a stand-in for, see :func:`vhquad.quad.pipeline.remesh_mesh`.
-    with_uv : bool
-        Make the integer-grid map on the triangles as well.
-    repair_lines : sequence of str
-        What was repaired.
-    seconds : dict, optional
-        Wall time of the steps before.
-    progress : callable, optional
-
-    Returns
-    -------
-    RemeshResult
-    """
-    result = remesh_mesh(
-        mesh,
-        field,
-        settings,
-        creases=creases,
-        density=density,
-        onto=onto,
-        with_uv=with_uv,
-        progress=progress,
-    )
-    spent = dict(seconds or {})
-    for step, value in result.report.seconds.items():
-        spent[step] = spent.get(step, 0.0) + value
-    report = replace(result.report, repair=(*repair_lines, *result.report.repair), seconds=spent)
-    return replace(result, report=report)
 
 
 def own_field(mesh: TriMesh, field: CrossField | str | PathLike[str]) -> CrossField:
@@ -448,13 +299,3 @@ def describe_field(
         repair=tuple(repair_lines),
         seconds=dict(seconds or {}),
     )
-
-
-@contextmanager
-def clock(seconds: dict[str, float], step: str) -> Iterator[None]:
-    """Add the wall time of a step."""
-    start = time.perf_counter()
-    try:
-        yield
-    finally:
-        seconds[step] = seconds.get(step, 0.0) + time.perf_counter() - start

@@ -81,13 +81,14 @@ def predict(
         from vhquad import api
         from vhquad.field.io import FORMAT_LOSSES, write_field
         from vhquad.mesh.io import write_triangle_mesh
+        from vhquad.watch import Watch
 
-        seconds: dict[str, float] = {}
+        watch = Watch()
         progress(f"reading {mesh}")
-        with api.clock(seconds, "read and repair"):
+        with watch("read and repair"):
             loaded = api.load(mesh) if no_cache else api.load_kept(mesh)
         progress("predicting the field")
-        with api.clock(seconds, "predict"):
+        with watch("predict"):
             field = api.predict(
                 loaded.mesh,
                 model,
@@ -97,11 +98,11 @@ def predict(
                 progress=progress,
             )
         progress("writing")
-        with api.clock(seconds, "write"):
+        with watch("write"):
             write_field(target, loaded.mesh, field)
             if mesh_out is not None:
                 write_triangle_mesh(mesh_out, loaded.mesh)
-        report = api.describe_field(loaded.mesh, field, loaded.lines(), seconds)
+        report = api.describe_field(loaded.mesh, field, loaded.lines(), watch.seconds)
         report = replace(report, lost=FORMAT_LOSSES[target.suffix.lower()])
     if loaded.report.changed and mesh_out is None:
         warn(

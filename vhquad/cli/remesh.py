@@ -198,7 +198,9 @@ def remesh(
         from vhquad.mesh.io import write_quad_mesh
         from vhquad.mesh.scalars import read_density
         from vhquad.quad.pipeline import RemeshSettings
+        from vhquad.quad.remeshing import remesh_predicted, remesh_with
         from vhquad.quad.sizing import checked_density
+        from vhquad.watch import Watch
 
         if preview is not None:
             from vhquad.picture import check_viz
@@ -212,9 +214,9 @@ def remesh(
             symmetry=symmetry.value,
             seed=seed,
         )
-        seconds: dict[str, float] = {}
+        watch = Watch()
         progress(f"reading {mesh}")
-        with api.clock(seconds, "read and repair"):
+        with watch("read and repair"):
             loaded = api.load(mesh) if no_cache else api.load_kept(mesh)
         factor = None
         if density is not None:
@@ -223,10 +225,10 @@ def remesh(
         creases = _given_creases(loaded, angle, sharp)
         progress("the cross field")
         if field is not None:
-            with api.clock(seconds, "field"):
+            with watch("field"):
                 cross = api.own_field(loaded.mesh, field)
             surface = loaded.mesh
-            result = api.remesh_with(
+            result = remesh_with(
                 surface,
                 cross,
                 settings,
@@ -234,7 +236,7 @@ def remesh(
                 density=factor,
                 with_uv=uv_out is not None,
                 repair_lines=loaded.lines(),
-                seconds=seconds,
+                watch=watch,
                 progress=progress,
             )
         else:
@@ -250,7 +252,7 @@ def remesh(
                     progress=progress,
                 )
 
-            made = api.remesh_predicted(
+            made = remesh_predicted(
                 loaded.mesh,
                 predicted,
                 settings,
@@ -260,7 +262,7 @@ def remesh(
                 cache=not no_cache,
                 with_uv=uv_out is not None,
                 repair_lines=loaded.lines(),
-                seconds=seconds,
+                watch=watch,
                 progress=progress,
             )
             result, cross, surface = made.result, made.field, made.mesh

@@ -19,8 +19,9 @@ from scipy.sparse import coo_matrix, diags
 from vhquad.errors import FieldError
 from vhquad.field.cross import CrossField
 from vhquad.field.dual import carry4, dirichlet, dual_weights
-from vhquad.field.smooth import factorized, unit
+from vhquad.field.smooth import unit
 from vhquad.geometry.laplacian import diffuse
+from vhquad.geometry.sparse import PositiveFactor
 from vhquad.mesh.triangle import TriMesh
 
 __all__ = ["bend_to_density"]
@@ -69,7 +70,7 @@ def bend_to_density(
         return field
     energy = dirichlet(mesh, dual_weights(mesh), carry)
     tiny = 1e-9 * mesh.face_areas / mesh.area  # components without any cross
-    z = factorized(energy + diags(stay + tiny))(stay * field.z)
+    z = PositiveFactor(energy + diags(stay + tiny)).solve(stay * field.z)
     return CrossField("faces", np.where(np.abs(z) > 0, unit(z), 0.0), field.size, field.confidence)
 
 

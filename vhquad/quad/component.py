@@ -34,8 +34,8 @@ from vhquad.quad.quantize import quantise
 from vhquad.quad.seamless_map import SeamlessMap, solve_seamless_map
 from vhquad.quad.smooth import smooth_quads
 from vhquad.quad.tmesh import build_tmesh
-from vhquad.quad.watch import Watch
 from vhquad.report import ComponentReport, MeshCounts
+from vhquad.watch import Watch
 
 __all__ = ["MAP", "PAIRED", "Progress", "remesh_component"]
 

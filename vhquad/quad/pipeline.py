@@ -22,8 +22,8 @@ from vhquad.quad.component import Progress, remesh_component
 from vhquad.quad.parts import Part, UvMap, join_quads, join_uv
 from vhquad.quad.sizing import checked_density, wanted_sizes
 from vhquad.quad.symmetric import SYMMETRIES, find_plane, remesh_mirrored
-from vhquad.quad.watch import Watch
 from vhquad.report import MeshCounts, RemeshReport, SymmetryReport
+from vhquad.watch import Watch
 
 __all__ = ["RemeshResult", "RemeshSettings", "UvMap", "remesh_mesh"]
 
