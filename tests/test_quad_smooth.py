@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.map_stages import stages
 from tests.quad_meshes import (
     Quads,
     cube_sphere,
@@ -16,12 +17,20 @@ from tests.quad_meshes import (
 )
 from vhquad.errors import MeshError
 from vhquad.mesh.closest import ClosestPoints
+from vhquad.mesh.quad import QuadMesh
 from vhquad.quad.curves import CurveConstraints
-from vhquad.quad.distortion import corner_jacobians, distortion, quad_normals
+from vhquad.quad.distortion import corner_jacobians, distortion, misalignment, quad_normals
+from vhquad.quad.embed import embed_layout
+from vhquad.quad.guide import FieldGuide
 from vhquad.quad.sliding import folded_quads
 from vhquad.quad.smooth import smooth_quads, smoothed_sizes
 
 NOBODY = np.zeros(0, dtype=np.int64)
+
+
+def quad_edges(x: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """The four edges of each quad, in its order; (k, 4, 3)."""
+    return x[np.roll(q, -1, axis=1)] - x[q]
 
 
 def outward(quads: Quads, x: np.ndarray) -> np.ndarray:
@@ -165,6 +174,71 @@ def test_gradient_is_that_of_the_energy(rng: np.random.Generator) -> None:
         # Central differences: error about h², far below the tolerance.
         slope = (at.gradient * direction).sum()
         assert (ahead - behind) / (2 * h) == pytest.approx(slope, rel=1e-5)
+
+
+def test_edges_off_a_direction_cost_their_share_across() -> None:
+    v, q = quad_grid(3, 2)
+    n, size = np.tile([0.0, 0.0, 1.0], (len(q), 1)), np.full(len(q), 2.0)
+    first = quad_edges(v, q)[:, 0]
+
+    def cost(angle: float) -> float:
+        c, s = np.cos(angle), np.sin(angle)
+        along = first @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])
+        return misalignment(v, q, n, size, along)[0]
+
+    # Four unit edges a quad, each with sin(angle) across, over s = 2.
+    assert cost(0.0) == pytest.approx(0.0, abs=1e-30)
+    assert cost(0.3) == pytest.approx(len(q) * 0.5 * 4 * (np.sin(0.3) / 2) ** 2)
+    assert cost(0.3 + np.pi) == pytest.approx(cost(0.3))
+    energy, gradient = misalignment(v, q, n, size, np.zeros_like(first))
+    assert energy == 0.0
+    assert not gradient.any()
+
+
+def test_gradient_of_the_misalignment(rng: np.random.Generator) -> None:
+    v, q = cube_sphere(2)
+    x = v + 0.2 * rng.normal(size=v.shape)
+    n, size = quad_normals(x, q), rng.uniform(0.5, 1.0, len(q))
+    along = rng.normal(size=(len(q), 3))
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    _, gradient = misalignment(x, q, n, size, along)
+    move, h = rng.normal(size=v.shape), 1e-5
+    ahead = misalignment(x + h * move, q, n, size, along)[0]
+    behind = misalignment(x - h * move, q, n, size, along)[0]
+    # The energy is quadratic: central differences are exact up to rounding.
+    assert (ahead - behind) / (2 * h) == pytest.approx((gradient * move).sum(), rel=1e-8)
+
+
+def test_a_guided_polish_keeps_to_the_field(rng: np.random.Generator) -> None:
+    s = stages("blob")
+    mesh = s.aligned.mesh
+    layout = s.quantise(300).layout
+    quads = QuadMesh(embed_layout(layout, s.aligned, s.seamless), layout.quads)
+    surface, guide = ClosestPoints(mesh), FieldGuide(s.aligned)
+
+    def off(x: np.ndarray) -> float:
+        edge = quad_edges(x, quads.quads)[:, 0]
+        along = guide.along(x[quads.quads].mean(axis=1), edge)
+        cosine = (along * edge).sum(axis=1) / np.linalg.norm(edge, axis=1)
+        return float(np.degrees(np.arccos(np.clip(cosine, -1, 1))).mean())
+
+    free = smooth_quads(quads.vertices, quads.quads, surface)
+    guided = smooth_quads(quads.vertices, quads.quads, surface, guide=guide)
+    assert off(guided) < 0.8 * off(free)
+    assert (corner_jacobians(guided, quads.quads, quad_normals(guided, quads.quads)) > 0).all()
+
+
+def test_the_guide_gives_the_nearest_arm() -> None:
+    s = stages("grid")
+    mesh = s.aligned.mesh
+    centres = mesh.vertices[mesh.faces].mean(axis=1)
+    for angle in np.radians([0, 30, 100, 200, 300]):
+        near = np.tile([np.cos(angle), np.sin(angle), 0.0], (len(centres), 1))
+        arm = FieldGuide(s.aligned).along(centres, near)
+        turn = np.round(angle / (np.pi / 2)) * np.pi / 2  # the field runs along the axes
+        np.testing.assert_allclose(
+            arm, np.tile([np.cos(turn), np.sin(turn), 0], (len(arm), 1)), atol=1e-9
+        )
 
 
 def test_unit_square_is_the_minimum() -> None:

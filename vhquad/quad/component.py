@@ -26,6 +26,7 @@ from vhquad.mesh.triangle import TriMesh
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.embed import embed_layout
 from vhquad.quad.fallback import triangles_to_quads
+from vhquad.quad.guide import FieldGuide
 from vhquad.quad.integer_map import integer_map
 from vhquad.quad.layout import Layout
 from vhquad.quad.motorcycle import Tracing, trace
@@ -220,7 +221,15 @@ def _polished(mapped: _Mapped, surface: ClosestPoints, watch: Watch, tell: Progr
     quads = mapped.quads
     with watch("polish"):
         fixed, curves = _constraints(mapped.layout)
-        moved = smooth_quads(quads.vertices, quads.quads, surface, fixed, curves, loosen=True)
+        moved = smooth_quads(
+            quads.vertices,
+            quads.quads,
+            surface,
+            fixed,
+            curves,
+            loosen=True,
+            guide=FieldGuide(mapped.aligned),
+        )
     return QuadMesh(moved, quads.quads)
 
 

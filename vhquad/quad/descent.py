@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, diags_array
 
 from vhquad.geometry.sparse import PositiveFactor
-from vhquad.quad.distortion import cross, distortion, unit
+from vhquad.quad.distortion import cross, unit
 from vhquad.quad.sliding import (
-    SIZE_WEIGHT,
+    GUIDANCE,
     Problem,
     State,
+    cost,
     place,
     reference_normals,
     tangential,
@@ -51,7 +52,7 @@ def spread(problem: Problem, state: State, factor: PositiveFactor, iterations: i
         d = edge[:, 0] - edge[:, 2] + cross(edge[:, 1] - edge[:, 3], n)
         d -= np.einsum("ki,ki->k", d, n)[:, None] * n
         side = np.clip(0.25 * np.sqrt(np.einsum("ki,ki->k", d, d)), low, high)
-        d = side[:, None] * unit(d)
+        d = side[:, None] * unit(unit(d) + GUIDANCE * problem.along)
         turned = cross(n, d)
         wanted = np.stack([d, turned, -d, -turned], axis=1)
         pull = (wanted - edge) / (problem.size**2)[:, None, None]
@@ -127,9 +128,9 @@ def descend(
     gradient, moved, last_epsilon = np.zeros((0, 3)), np.zeros((0, 3)), 0.0
     while number < iterations or (best.folded.any() and number < best_at + patience):
         number += 1
-        args = (problem.quads, state.quad_normals, problem.size)
-        epsilon = _epsilon(distortion(state.vertices, *args, 1.0, SIZE_WEIGHT, False).area)
-        now = distortion(state.vertices, *args, epsilon, SIZE_WEIGHT)
+        normals = state.quad_normals
+        epsilon = _epsilon(cost(problem, state.vertices, normals, 1.0, False).area)
+        now = cost(problem, state.vertices, normals, epsilon)
         last, gradient = gradient, tangential(problem, state, now.gradient)
         if not 1 / 1.5 < epsilon / max(last_epsilon, 1e-300) < 1.5:
             history = []  # of another energy
@@ -150,7 +151,7 @@ def descend(
         scale = min(1.0, 1.0 / length)
         for _ in range(12):
             ahead = state.vertices + scale * move
-            trial = distortion(ahead, *args, epsilon, SIZE_WEIGHT, False).energy
+            trial = cost(problem, ahead, normals, epsilon, False).energy
             if trial <= now.energy + 1e-4 * scale * slope:
                 break
             scale *= 0.5

@@ -19,7 +19,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Distortion", "corner_jacobians", "cross", "distortion", "quad_normals", "unit"]
+__all__ = [
+    "Distortion",
+    "corner_jacobians",
+    "cross",
+    "distortion",
+    "misalignment",
+    "quad_normals",
+    "unit",
+]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -112,8 +120,38 @@ def distortion(
     g1 = by_stretch * e1 + by_area * cross(e2, n)
     g2 = by_stretch * e2 + by_area * cross(n, e1)
     g = g1[:, [3, 0, 1, 2]] + g2[:, [1, 2, 3, 0]] - g1 - g2
+    return Distortion(float(cost.sum()), _gathered(g, quads, len(vertices)), d)
+
+
+def misalignment(
+    vertices: Floats, quads: Ints, normals: Floats, size: Floats, along: Floats
+) -> tuple[float, Floats]:
+    """How far edges run off given directions: half the squared share of each edge across, by s².
+
+    Parameters
+    ----------
+    vertices, quads, normals, size
+        As in :func:`distortion`.
+    along : (k, 3) float64
+        Unit direction for edges 0 and 2 of each quad, either way; edges 1 and 3 should run at a
+        right angle to it. Zero where any direction will do.
+
+    Returns
+    -------
+    energy : float
+    gradient : (n, 3) float64
+    """
+    first = unit(along - np.einsum("ki,ki->k", along, normals)[:, None] * normals)
+    second = cross(normals, first)
+    across = np.stack([second, first, second, first], axis=1)
+    p = vertices[quads]
+    share = np.einsum("kci,kci->kc", p[:, [1, 2, 3, 0]] - p, across) / size[:, None]
+    g = (share / size[:, None])[..., None] * across
+    return 0.5 * float((share**2).sum()), _gathered(g[:, [3, 0, 1, 2]] - g, quads, len(vertices))
+
+
+def _gathered(corners: Floats, quads: Ints, n: int) -> Floats:
+    """Sum of vectors at the corners of quads over each vertex; (n, 3)."""
     index = quads.reshape(-1)
-    gradient: Floats = np.stack(
-        [np.bincount(index, g[..., i].reshape(-1), len(vertices)) for i in range(3)], axis=1
-    )
-    return Distortion(float(cost.sum()), gradient, d)
+    total = [np.bincount(index, corners[..., i].reshape(-1), n) for i in range(3)]
+    return np.stack(total, axis=1)

@@ -1,9 +1,13 @@
 """A seamless map without flips that follows a cross field, rounded to exact integer coordinates.
 
 The map minimises ``sum_f w_f A_f |grad (u, v) - s_f (X, X_perp)|^2`` over the seamless space
-(Bommes et al. 2009, eq. 5, without any rounding of singularities), with the weights of folded and
-strongly distorted triangles doubled until no triangle is folded (local stiffening, ibid. 5.4) and
-the map turns by the right angle around every vertex.
+(Bommes et al. 2009, eq. 5, without any rounding of singularities), where the share of the gradient
+of u along X, and of v along X_perp, counts for less than the share across: a map cannot have the
+directions of a field and its sizes both, and edges that run off are seen sooner than quads that are
+longer than wide. Only where the surface turns much within a quad, as at the tip of a limb, sizes
+count as much, else the tip is cut off. The weights of folded and strongly distorted triangles are
+raised until no triangle is folded (local stiffening, ibid. 5.4) and the map turns by the right
+angle around every vertex.
 """
 
 from __future__ import annotations
@@ -25,6 +29,7 @@ __all__ = ["SeamlessMap", "solve_seamless_map"]
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+LEAST_SIZE_WEIGHT = 0.1
 UNITS_PER_EDGE = 1 << 20
 """Integer units in a mean mesh edge: fine enough for any triangle, and products stay in int64."""
 
@@ -159,6 +164,10 @@ class _Problem:
         area = np.maximum(mesh.face_areas, 1e-12 * mesh.face_areas.max())
         self.gradient = 1j * opposite / (2 * area[:, None])  # (m, 3) complex
         self.area = area
+        normals = mesh.vertex_normals[mesh.faces]
+        change = np.einsum("fk,fki->fi", self.gradient, normals)  # complex: d/dx + i d/dy
+        turn = np.linalg.norm(change, axis=1) * size  # radians within a quad
+        self.size_weight = np.clip(turn, LEAST_SIZE_WEIGHT, 1.0)
         self.target = self.stretch * np.exp(1j * space.angle)
         self.basis = (space.basis / space.denominator).tocsr()
         self.transpose = self.basis.T.tocsr()
@@ -167,29 +176,21 @@ class _Problem:
     def solve(self, weight: Floats) -> Floats:
         """Minimiser for the given face weights; (d,)."""
         wa = weight * self.area
-        g = self.gradient
-        local = wa[:, None, None] * (g[:, :, None] * g[:, None, :].conj()).real
-        n = self.basis.shape[0] // 2
+        # Shares of the hat functions' gradients along X and X_perp.
+        g = self.gradient * np.exp(-1j * np.angle(self.target))[:, None]
+        n = self.basis.shape[0]
         i = np.repeat(self.wedge, 3, axis=1).ravel()
         j = np.tile(self.wedge, (1, 3)).ravel()
-        laplacian = coo_matrix((local.ravel(), (i, j)), shape=(n, n)).tocsr()
-        half = laplacian.tocoo()
-        full = coo_matrix(
-            (
-                np.concatenate([half.data, half.data]),
-                (
-                    np.concatenate([2 * half.row, 2 * half.row + 1]),
-                    np.concatenate([2 * half.col, 2 * half.col + 1]),
-                ),
-            ),
-            shape=(2 * n, 2 * n),
-        ).tocsr()
-        right = np.zeros(2 * n)
-        flat = self.wedge.ravel()
-        for axis, target in ((0, self.target), (1, 1j * self.target)):
-            pull = wa[:, None] * (g.conj() * target[:, None]).real
-            np.add.at(right, 2 * flat + axis, pull.ravel())
-        matrix = (self.transpose @ full @ self.basis).tocsc()
+        blocks, right = [], np.zeros(n)
+        for axis, along, across in ((0, g.real, g.imag), (1, g.imag, g.real)):
+            local = self.size_weight[:, None, None] * along[:, :, None] * along[:, None, :]
+            local += across[:, :, None] * across[:, None, :]
+            values = (wa[:, None, None] * local).ravel()
+            entries = (values, (2 * i + axis, 2 * j + axis))
+            blocks.append(coo_matrix(entries, shape=(n, n)).tocsr())
+            pull = (self.size_weight * wa * self.stretch)[:, None] * along
+            right += np.bincount(2 * self.wedge.ravel() + axis, pull.ravel(), n)
+        matrix = (self.transpose @ (blocks[0] + blocks[1]) @ self.basis).tocsc()
         # Charts may drift together where nothing ties them down: hold them softly. The wanted
         # gradients do not care, so a weak pull on all unknowns changes nothing visible.
         matrix = matrix + diags(np.full(matrix.shape[0], 1e-9 * matrix.diagonal().mean()))

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vhquad.mesh.closest import ClosestPoints, Hits
 from vhquad.quad.curves import CurveConstraints
-from vhquad.quad.distortion import corner_jacobians, distortion, quad_normals, unit
+from vhquad.quad.distortion import (
+    Distortion,
+    corner_jacobians,
+    distortion,
+    misalignment,
+    quad_normals,
+    unit,
+)
 
 __all__ = [
-    "SIZE_WEIGHT",
+    "GUIDANCE",
     "Problem",
     "State",
+    "cost",
     "folded_quads",
     "make_problem",
     "measure",
@@ -28,6 +36,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 SIZE_WEIGHT = 0.3
+GUIDANCE = 10.0  # weight of edges off the field's directions
 SAME_SIDE = 0.2  # least cosine between normals before and after a step
 
 
@@ -43,6 +52,7 @@ class Problem:
     on_curve: Ints  # vertices that slide on a curve
     reach: Floats  # (n,) least wanted edge length around each vertex: the longest step
     trust: Floats  # (n,) weight of a vertex's surface normal in its quads' reference normals
+    along: Floats  # (k, 3) unit direction for edges 0 and 2 of each quad; 0 for any
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,15 +84,23 @@ def folded_quads(vertices: Floats, quads: Ints, surface_normals: Floats) -> Bool
 
 
 def make_problem(
-    quads: Ints, surface: ClosestPoints, curves: CurveConstraints, fixed: Bools, size: Floats
+    quads: Ints,
+    surface: ClosestPoints,
+    curves: CurveConstraints,
+    fixed: Bools,
+    size: Floats,
+    along: Floats | None = None,
 ) -> Problem:
     """Derive what stays the same from the parts of the problem."""
+    if along is None:
+        along = np.zeros((len(quads), 3))
     reach = np.full(len(fixed), np.inf)
     np.minimum.at(reach, quads.reshape(-1), np.repeat(size, 4))
     sliding = (curves.curve >= 0) & ~fixed
     # A crease has two normals: prefer those of a quad's plain vertices.
     trust = np.where((curves.curve >= 0) | fixed, 0.01, 1.0)
-    return Problem(quads, surface, curves, fixed, size, np.flatnonzero(sliding), reach, trust)
+    on_curve = np.flatnonzero(sliding)
+    return Problem(quads, surface, curves, fixed, size, on_curve, reach, trust, along)
 
 
 def place(problem: Problem, wanted: Floats, before: State | None) -> State:
@@ -139,8 +157,20 @@ def measure(problem: Problem, x: Floats, arc: Floats, normals: Floats, face: Int
     folded = inverted | ((facing <= 0) & (nearest <= 0))
     trusted = ~folded & ((facing > 0.3) | (nearest > 0.7))
     reference = np.where(trusted[:, None], own, around)
-    energy = distortion(x, quads, reference, problem.size, 1e-3, SIZE_WEIGHT, False).energy
+    energy = cost(problem, x, reference, 1e-3, False).energy
     return State(x, arc, normals, face, reference, folded, energy)
+
+
+def cost(
+    problem: Problem, x: Floats, normals: Floats, epsilon: float, with_gradient: bool = True
+) -> Distortion:
+    """Distortion of the quads about some normals, and what their edges run off the field."""
+    out = distortion(x, problem.quads, normals, problem.size, epsilon, SIZE_WEIGHT, with_gradient)
+    if not problem.along.any():
+        return out
+    off, pull = misalignment(x, problem.quads, normals, problem.size, problem.along)
+    gradient = out.gradient + GUIDANCE * pull if with_gradient else out.gradient
+    return replace(out, energy=out.energy + GUIDANCE * off, gradient=gradient)
 
 
 def reference_normals(problem: Problem, normals: Floats) -> Floats:

@@ -8,6 +8,8 @@ is returned: never more folded quads than came in.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_matrix
@@ -18,6 +20,7 @@ from vhquad.mesh.closest import ClosestPoints
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.descent import better, descend, laplacian_factor, spread
 from vhquad.quad.distortion import corner_jacobians, cross
+from vhquad.quad.guide import FieldGuide
 from vhquad.quad.sliding import Problem, State, make_problem, measure, place
 
 __all__ = ["smooth_quads", "smoothed_sizes"]
@@ -26,7 +29,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-SPREAD_ITERATIONS = 10
+SPREADS = 2  # between which the directions of the field are looked up again
+SPREAD_ITERATIONS = 5
 POOR = 0.1  # a quad with a scaled Jacobian below this gets a patch problem of its own
 FOLDED_ROUNDS = ((4, 0), (4, 5), (4, 0))  # rings around, and steps of spreading
 POOR_ROUNDS = 2
@@ -45,6 +49,7 @@ def smooth_quads(
     iterations: int = 30,
     target_edge: ArrayLike | None = None,
     loosen: bool = False,
+    guide: FieldGuide | None = None,
 ) -> Floats:
     """Move the vertices of a quad mesh over its surface until quads are unfolded and square.
 
@@ -68,6 +73,8 @@ def smooth_quads(
     loosen : bool
         Let the inner fixed and bound vertices of quads that stay folded go from their places and
         curves (creases), on the surface; those on the boundary of the quads never.
+    guide : FieldGuide, optional
+        Field whose directions the edges should keep.
 
     Returns
     -------
@@ -98,11 +105,14 @@ def smooth_quads(
         size *= np.sqrt(surface.mesh.area / (size**2).sum())
     hold[np.setdiff1d(np.arange(len(x)), q)] = True
     problem = make_problem(q, surface, bound, hold, size)
-    start = place(problem, x, None)
+    problem, start = _guided(problem, place(problem, x, None), guide)
     if hold.all() or iterations <= 0:
         return start.vertices
     factor = laplacian_factor(problem)
-    state = spread(problem, start, factor, SPREAD_ITERATIONS)
+    state = start
+    for _ in range(SPREADS):
+        state = spread(problem, state, factor, SPREAD_ITERATIONS)
+        problem, state = _guided(problem, state, guide)
     state = _mended(problem, descend(problem, state, factor, iterations), POOR)
     if state.folded.any():
         # Spreading may drag quads out of thin parts; unfolding first is slower but stays.
@@ -134,6 +144,16 @@ def smoothed_sizes(vertices: Floats, quads: Ints, area: float, rounds: int = 8) 
     return np.asarray(np.sqrt(value * (area / value.sum())))
 
 
+def _guided(problem: Problem, state: State, guide: FieldGuide | None) -> tuple[Problem, State]:
+    """The problem with the directions of the field where the quads are now, and the state in it."""
+    if guide is None:
+        return problem, state
+    p = state.vertices[problem.quads]
+    along = guide.along(p.mean(axis=1), p[:, 1] - p[:, 0] + p[:, 2] - p[:, 3])
+    problem = replace(problem, along=along)
+    return problem, measure(problem, state.vertices, state.arc, state.normals, state.face)
+
+
 def _loosened(problem: Problem, state: State) -> Problem:
     """The problem without the constraints of the folded quads' vertices, boundary ones apart."""
     tail, head = problem.quads, np.roll(problem.quads, -1, axis=1)
@@ -145,7 +165,12 @@ def _loosened(problem: Problem, state: State) -> Problem:
     let_go[tail[rim]] = let_go[head[rim]] = False
     curves = problem.curves.bind(np.where(let_go, -1, problem.curves.curve))
     return make_problem(
-        problem.quads, problem.surface, curves, problem.fixed & ~let_go, problem.size
+        problem.quads,
+        problem.surface,
+        curves,
+        problem.fixed & ~let_go,
+        problem.size,
+        problem.along,
     )
 
 
@@ -200,6 +225,7 @@ def _solve_patch(problem: Problem, state: State, inside: Bools, spreading: int) 
         problem.curves.bind(problem.curves.curve[used]),
         (held | problem.fixed)[used],
         problem.size[inside],
+        problem.along[inside],
     )
     if part.fixed.all():
         return state
