@@ -21,28 +21,23 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from bent_sheet import STEPS, answer, folded_sheet, rolled, train
 from matplotlib.colors import LinearSegmentedColormap
 from numpy.typing import NDArray
 from PIL import Image
 
 from vhquad.atomic import write_atomic
 from vhquad.field.cross import CrossField
-from vhquad.geometry.frames import build_frames, from_3d, vertex_axes
-from vhquad.geometry.operators import OperatorSettings, build_operators
+from vhquad.geometry.frames import build_frames
 from vhquad.learn.blend import lean_on_curvature
-from vhquad.learn.predict import predict_field, predict_input
+from vhquad.learn.predict import predict_field
 from vhquad.learn.proxy import carry_back
-from vhquad.learn.schedule import TrainSettings, learning_rate
 from vhquad.learn.targets import isotropic_remesh
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.load import load
 from vhquad.mesh.proxy import decimate
 from vhquad.mesh.triangle import TriMesh
 from vhquad.nn.checkpoint import Model, load_model
-from vhquad.nn.inputs import NetworkInput, network_input, stack
-from vhquad.nn.loss import FieldTruth, field_loss
-from vhquad.nn.network import VectorHeatNet
-from vhquad.nn.settings import ModelSettings
 from vhquad.picture import SURFACE, View, draw_crosses, open_panel, picture, view_of
 
 Floats = NDArray[np.float64]
@@ -50,7 +45,6 @@ Floats = NDArray[np.float64]
 PANEL = (330, 390)  # pixels
 SHOWN = 10.0  # degrees, the brightest colour
 CROSSES = 900
-STEPS, K = 300, 64  # of the network for the sheet
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,96 +172,24 @@ def _numbered_back(
 def on_sheet(model: Model) -> tuple[list[Change], list[Change], float]:
     """A sheet folded and rolled, by a network trained on it flat, with its loss, and by a model."""
     flat = folded_sheet(0.0)
-    network, loss = _train(flat)
-    rolled = _rolled(flat)
-    shorter = 100.0 * (1.0 - (rolled.edge_lengths / flat.edge_lengths).min())
+    network, loss = train(flat)
+    roll = rolled(flat)
+    shorter = 100.0 * (1.0 - (roll.edge_lengths / flat.edge_lengths).min())
     states = {
         "folded (Miura), every triangle as it was": folded_sheet(0.9),
-        f"rolled up, edges up to {shorter:.2f} % shorter": rolled,
+        f"rolled up, edges up to {shorter:.2f} % shorter": roll,
     }
 
-    def changes(answer: Callable[[TriMesh], CrossField]) -> list[Change]:
-        before = answer(flat)
+    def changes(field_of: Callable[[TriMesh], CrossField]) -> list[Change]:
+        before = field_of(flat)
         found = []
         for name, mesh in states.items():
-            field = answer(mesh)
+            field = field_of(mesh)
             found.append(Change(name, mesh, field, before, (mesh, field)))
         return found
 
-    trained = changes(lambda mesh: _answer(network, mesh))
+    trained = changes(lambda mesh: answer(network, mesh))
     return trained, changes(lambda mesh: predict_field(mesh, model, "full", cache=False)), loss
-
-
-def folded_sheet(fold: float, across: int = 6, along: int = 6, fine: int = 8) -> TriMesh:
-    """Miura's folding of parallelograms, by an angle from 0 (flat) towards pi/2; an isometry.
-
-    Each panel keeps its shape, so that all triangles of all foldings are congruent.
-    """
-    slant, a, b = np.radians(60.0), 1.0, 1.0
-    s, c = np.sin(fold), np.cos(fold)
-    stretch = np.sqrt(1.0 + (c * np.tan(slant)) ** 2)
-    lift, step = a * s * np.sin(slant), b * c * np.tan(slant) / stretch
-    advance, zigzag = a * np.sqrt(1.0 - (s * np.sin(slant)) ** 2), b / stretch
-    i, j = np.meshgrid(np.arange(along * fine + 1), np.arange(across * fine + 1), indexing="ij")
-    u, v = i / fine, j / fine  # panels are linear between whole numbers
-
-    def saw(t: Floats) -> Floats:
-        return np.abs((t + 1.0) % 2.0 - 1.0)
-
-    points = np.stack([v * step, u * advance + saw(v) * zigzag, saw(u) * lift], axis=-1)
-    width = across * fine + 1
-    corner = (i * width + j)[:-1, :-1].reshape(-1)
-    quads = corner[:, None] + np.array([0, 1, width + 1, width])
-    faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-    return TriMesh(points.reshape(-1, 3), faces)
-
-
-def _rolled(flat: TriMesh) -> TriMesh:
-    """Three quarters of a turn about y, the front outside."""
-    x, y = flat.vertices[:, 0], flat.vertices[:, 1]
-    radius = np.ptp(x) / np.radians(270.0)
-    angle = (x - x.mean()) / radius
-    points = np.stack([x.mean() + radius * np.sin(angle), y, radius * np.cos(angle)], axis=1)
-    return TriMesh(points, flat.faces)
-
-
-def _input(mesh: TriMesh) -> NetworkInput:
-    made = build_operators(mesh, OperatorSettings(k=K, features="hks", turned=True))
-    return network_input(made.mass, made.eigenvalues, made.eigenvectors, made.features)
-
-
-def _answer(network: VectorHeatNet, mesh: TriMesh) -> CrossField:
-    found = predict_input(network, _input(mesh))
-    return CrossField("vertices", found.z, found.size)
-
-
-def _train(flat: TriMesh) -> tuple[VectorHeatNet, float]:
-    """A small network that learns one field of the sheet; it need not be a good one."""
-    given = _input(flat)
-    p = (flat.vertices - flat.vertices.mean(axis=0))[:, :2]
-    p = p / np.ptp(p, axis=0)
-    angle = 0.7 * np.cos(2.0 * np.pi * p[:, 0]) + 3.0 * p[:, 0] * p[:, 1]
-    direction = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
-    u = from_3d(direction[:, None], vertex_axes(flat))[:, 0]
-    n = flat.n_vertices
-    size = torch.full((n,), 0.02)
-    truth = FieldTruth(stack((u / np.abs(u)) ** 4), size, given.mass)
-    channels = given.features.shape[2]
-    torch.manual_seed(0)
-    network = VectorHeatNet(
-        ModelSettings(in_channels=channels, channels=48, blocks=3, k=K, hidden_layers=1)
-    )
-    settings = TrainSettings(steps=STEPS, rate=3e-3)
-    optimizer = torch.optim.AdamW(network.parameters(), weight_decay=settings.weight_decay)
-    for step in range(STEPS):
-        for group in optimizer.param_groups:
-            group["lr"] = learning_rate(settings, step)
-        loss = field_loss(network(given), truth)
-        optimizer.zero_grad()
-        loss.total.backward()
-        torch.nn.utils.clip_grad_norm_(network.parameters(), settings.clip)
-        optimizer.step()
-    return network.eval(), float(field_loss(network(given), truth).direction.detach())
 
 
 # ---- what is written --------------------------------------------------------------------------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 from types import ModuleType
 
 import numpy as np
@@ -18,16 +18,9 @@ from vhquad.mesh.triangle import TriMesh
 @pytest.fixture(scope="module")
 def experiments() -> ModuleType:
     pytest.importorskip("matplotlib")  # comes with pyvista
-    path = ROOT / "benchmarks" / "invariances.py"
-    spec = importlib.util.spec_from_file_location("invariances", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    import sys
-
-    sys.modules["invariances"] = module  # dataclasses look their module up
-    spec.loader.exec_module(module)
-    return module
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(ROOT / "benchmarks")
+        return importlib.import_module("invariances")
 
 
 def test_folding_keeps_every_length(experiments: ModuleType) -> None:
