@@ -180,14 +180,14 @@ def _mended(problem: Problem, state: State, least: float) -> State:
         if not state.folded.any():
             break
         for patch in _components(problem, _rings(problem, state.folded, rings)):  # few
-            state = _solve_patch(problem, state, patch, spreading)
+            state = _solve_patch(problem, state, patch, spreading, guided=False)
     if not state.folded.any():
         for _ in range(POOR_ROUNDS):
             jacobians = corner_jacobians(state.vertices, problem.quads, state.quad_normals)
             poor = jacobians.min(axis=1) < least
             if not poor.any():
                 break
-            state = _solve_patch(problem, state, _rings(problem, poor, POOR_RINGS), 0)
+            state = _solve_patch(problem, state, _rings(problem, poor, POOR_RINGS), 0, guided=True)
     return state
 
 
@@ -213,7 +213,9 @@ def _components(problem: Problem, inside: Bools) -> list[Bools]:
     return [np.isin(np.arange(len(inside)), where[label == i]) for i in range(number)]
 
 
-def _solve_patch(problem: Problem, state: State, inside: Bools, spreading: int) -> State:
+def _solve_patch(
+    problem: Problem, state: State, inside: Bools, spreading: int, guided: bool
+) -> State:
     """Minimise again over some quads only, their outer vertices held."""
     held = np.ones(len(problem.fixed), dtype=bool)
     held[problem.quads[inside]] = False
@@ -225,7 +227,7 @@ def _solve_patch(problem: Problem, state: State, inside: Bools, spreading: int) 
         problem.curves.bind(problem.curves.curve[used]),
         (held | problem.fixed)[used],
         problem.size[inside],
-        problem.along[inside],
+        problem.along[inside] if guided else None,
     )
     if part.fixed.all():
         return state
