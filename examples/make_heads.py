@@ -126,7 +126,8 @@ def write_obj(path: Path, vertices: NDArray[np.float64], faces: NDArray[np.int64
 def make_set(folder: Path, count: int, maker: HeadMaker) -> None:
     """Write ``count`` people and the split into ``folder``; files that are there are kept."""
     folder.mkdir(parents=True, exist_ok=True)
-    split = {}
+    listed = folder / "split.json"  # may list others
+    split = json.loads(listed.read_text(encoding="ascii")) if listed.exists() else {}
     for identity in range(count):
         name = f"{maker.kind}_{identity:04d}"
         place = identity % 15
@@ -135,7 +136,7 @@ def make_set(folder: Path, count: int, maker: HeadMaker) -> None:
         if not path.exists():
             vertices, quads, _ = maker.draw(identity)
             write_obj(path, vertices, quads)
-    (folder / "split.json").write_text(json.dumps(split, indent=1) + "\n", encoding="ascii")
+    listed.write_text(json.dumps(split, indent=1) + "\n", encoding="ascii")
 
 
 def make_scan(path: Path, seed: int) -> None:
