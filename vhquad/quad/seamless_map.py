@@ -7,13 +7,15 @@ directions of a field and its sizes both, and edges that run off are seen sooner
 longer than wide. Only where the surface turns much within a quad, as at the tip of a limb, sizes
 count as much, else the tip is cut off. The weights of folded and strongly distorted triangles are
 raised until no triangle is folded (local stiffening, ibid. 5.4) and the map turns by the right
-angle around every vertex.
+angle around every vertex; when few folds are left, unfolding their surroundings may end it sooner
+(:mod:`vhquad.quad.untangle`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +23,9 @@ from scipy.sparse import coo_matrix, diags
 
 from vhquad.field.align import AlignedField
 from vhquad.mesh.triangle import TriMesh, next_halfedge
-from vhquad.quad.map_energy import solve_positive
+from vhquad.quad.map_energy import MapEnergy, solve_positive
 from vhquad.quad.seamless import SeamlessSpace, seamless_space
+from vhquad.quad.untangle import untangled
 
 __all__ = ["SeamlessMap", "solve_seamless_map"]
 
@@ -30,6 +33,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 LEAST_SIZE_WEIGHT = 0.1
+FEW_FOLDS = 50  # that are worth unfolding by themselves
+RINGS = 4  # of triangles around them
 UNITS_PER_EDGE = 1 << 20
 """Integer units in a mean mesh edge: fine enough for any triangle, and products stay in int64."""
 
@@ -125,6 +130,10 @@ def solve_seamless_map(
         solves += 1
         unknowns = problem.solve(weight)
         candidate = _snap(aligned, space, problem, unknowns, solves)
+        if 0 < candidate.flips <= FEW_FOLDS:
+            smooth = untangled(problem.energy, unknowns, RINGS)
+            other = _snap(aligned, space, problem, smooth, solves)
+            candidate = other if other.is_valid else candidate
         if on_solve is not None:
             on_solve(solves, candidate.flips)
         return unknowns, candidate
@@ -172,6 +181,11 @@ class _Problem:
         self.basis = (space.basis / space.denominator).tocsr()
         self.transpose = self.basis.T.tocsr()
         self.denominator = space.denominator
+
+    @cached_property
+    def energy(self) -> MapEnergy:
+        """Distortion of the maps of the space."""
+        return MapEnergy(self.mesh, self.wedge, self.basis, self.target)
 
     def solve(self, weight: Floats) -> Floats:
         """Minimiser for the given face weights; (d,)."""
