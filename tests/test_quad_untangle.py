@@ -1,4 +1,4 @@
-"""Unfolding a map: folds planted in a good one go, nothing far away moves, and it stays seamless."""
+"""Unfolding a map: planted folds go, nothing far away moves, and a good map stays as it is."""
 
 from __future__ import annotations
 
