@@ -221,11 +221,15 @@ def test_sizes_of_the_field_steer_the_density() -> None:
     expected = float((mesh.face_areas / field.size**2).sum())
     assert native.report.asked == pytest.approx(expected, abs=1)
     assert native.quads.n_quads == pytest.approx(expected, rel=0.1)
-    # 2. larger quads above; adaptivity 0 ignores the sizes
-    flat = remesh_mesh(mesh, field, RemeshSettings(target_quads=300, adaptivity=0.0))
-    for result, least, most in ((flat, 0.9, 1.12), (native, 0.3, 0.85)):
-        z = result.quads.vertices[result.quads.quads].mean(axis=1)[:, 2]
-        assert least < (z > 0).sum() / (z < 0).sum() < most
+    # 2. columns as far apart as the sizes say; adaptivity 0 ignores them
+    flat = grid(24, 24)
+    x = flat.vertices[flat.faces].mean(axis=1)[:, 0]
+    along = field_along(flat, np.tile([1.0, 0.0, 0.0], (flat.n_faces, 1)))
+    wider = CrossField("faces", along, 0.04 * np.exp(x))
+    for adaptivity, ratio in ((0.0, 1.0), (1.0, np.exp(-0.5))):
+        result = remesh_mesh(flat, wider, RemeshSettings(400, adaptivity=adaptivity))
+        centre = result.quads.vertices[result.quads.quads].mean(axis=1)[:, 0]
+        assert (centre > 0.5).sum() / (centre < 0.5).sum() == pytest.approx(ratio, rel=0.15)
     # 3. an edge length instead of a count
     edge = remesh_mesh(mesh, field, RemeshSettings(edge_length=0.2))
     assert edge.report.asked == round(mesh.area / 0.04)
@@ -291,7 +295,7 @@ def test_a_field_without_a_map_falls_back(monkeypatch: pytest.MonkeyPatch) -> No
 
     solve = component.solve_seamless_map
     monkeypatch.setattr(
-        component, "solve_seamless_map", lambda aligned: replace(solve(aligned), flips=3, solves=9)
+        component, "solve_seamless_map", lambda *a, **k: replace(solve(*a, **k), flips=3, solves=9)
     )
     mesh = merge(icosphere(2), moved(grid(), (3.0, 0, 0)))
     result = run(mesh, 200)

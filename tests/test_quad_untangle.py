@@ -15,7 +15,7 @@ from vhquad.quad.untangle import untangled
 def prepared(name: str) -> tuple[MapEnergy, np.ndarray, SeamlessSpace]:
     """The energy of a stage's maps, and the unknowns of its least-squares map, free of folds."""
     s = stages(name)
-    problem = _Problem(s.aligned, s.space)
+    problem = _Problem(s.aligned, s.space, 0.1)
     x = problem.solve(np.ones(s.aligned.mesh.n_faces))
     assert (determinants(problem.energy.frames(x)) > 0).all()
     return problem.energy, x, s.space

@@ -110,14 +110,14 @@ def remesh_component(
     target: int,
     slack: float,
     surface: ClosestPoints,
+    size_weight: float,
     with_uv: bool,
     tell: Progress,
 ) -> Part:
     """Quads of one component by the first attempt that gives a valid mesh of about the count.
 
-    If some of them stay folded, another attempt may do better.
-
-    Within ``slack`` quads any count is near enough.
+    Within ``slack`` quads any count is near enough. Where quads stay folded, another attempt may do
+    better.
     """
     watch = Watch()
     length = float(np.sqrt(mesh.area / target))
@@ -127,7 +127,7 @@ def remesh_component(
     for attempt in _ATTEMPTS:
         creases = attempt.creases(mesh, given, angle, length)
         try:
-            mapped = _by_map(mesh, field, creases, seam, target, attempt, watch, tell)
+            mapped = _by_map(mesh, field, creases, seam, target, size_weight, attempt, watch, tell)
         except (ParametrizationError, FieldError) as problem:
             reasons.append(str(problem))
             continue
@@ -179,6 +179,7 @@ def _by_map(
     creases: Ints,
     seam: Bools | None,
     target: int,
+    size_weight: float,
     attempt: _Attempt,
     watch: Watch,
     tell: Progress,
@@ -197,7 +198,7 @@ def _by_map(
         aligned = align_field(mesh, field, creases, settings, seam)
     tell("map", 0.15)
     with watch("map"):
-        seamless = solve_seamless_map(aligned)
+        seamless = solve_seamless_map(aligned, size_weight=size_weight)
     if not seamless.is_valid:
         raise ParametrizationError(
             f"{seamless.flips} triangles of the map stay folded after {seamless.solves} solves"

@@ -20,6 +20,7 @@ from vhquad.mesh.quality import check_quads
 from vhquad.mesh.triangle import TriMesh
 from vhquad.quad.component import Progress, remesh_component
 from vhquad.quad.parts import Part, UvMap, join_quads, join_uv
+from vhquad.quad.seamless_map import SIZE_WEIGHT
 from vhquad.quad.sizing import checked_density, wanted_sizes
 from vhquad.quad.symmetric import SYMMETRIES, find_plane, remesh_mirrored
 from vhquad.report import MeshCounts, RemeshReport, SymmetryReport
@@ -155,9 +156,10 @@ def remesh_mesh(
     field = replace(field, size=size)
     if factor is not None:
         field = bend_to_density(mesh, field, factor, float(np.sqrt(mesh.area / asked)))
+    size_weight = SIZE_WEIGHT if factor is None else 1.0  # who asks for a density wants it
     given = None if creases is None else np.asarray(creases, dtype=np.int64).reshape(-1, 2)
     result, parts, symmetry = _remesh(
-        mesh, field, given, settings, original, with_uv, watch, progress
+        mesh, field, given, settings, original, size_weight, with_uv, watch, progress
     )
     with watch("check"):
         quality = check_quads(result, original)
@@ -186,6 +188,7 @@ def _remesh(
     given: Ints | None,
     settings: RemeshSettings,
     original: TriMesh,
+    size_weight: float,
     with_uv: bool,
     watch: Watch,
     progress: Progress | None,
@@ -196,7 +199,9 @@ def _remesh(
         half: TriMesh, own: CrossField, creases: Ints | None, seam: Bools | None
     ) -> list[Part]:
         surface = original if half is mesh else half
-        return _remesh_parts(half, own, creases, seam, settings.crease, surface, with_uv, progress)
+        return _remesh_parts(
+            half, own, creases, seam, settings.crease, surface, size_weight, with_uv, progress
+        )
 
     symmetry: SymmetryReport | None = None
     if settings.symmetry != "off":
@@ -220,6 +225,7 @@ def _remesh_parts(
     seam: Bools | None,
     angle: float | None,
     original: TriMesh,
+    size_weight: float,
     with_uv: bool,
     progress: Progress | None,
 ) -> list[Part]:
@@ -257,7 +263,17 @@ def _remesh_parts(
         surface = ClosestPoints(whole)
         parts.append(
             remesh_component(
-                part, part_field, own, edge, angle, target, slack, surface, with_uv, tell
+                part,
+                part_field,
+                own,
+                edge,
+                angle,
+                target,
+                slack,
+                surface,
+                size_weight,
+                with_uv,
+                tell,
             )
         )
     return parts

@@ -27,12 +27,12 @@ from vhquad.quad.map_energy import MapEnergy, solve_positive
 from vhquad.quad.seamless import SeamlessSpace, seamless_space
 from vhquad.quad.untangle import untangled
 
-__all__ = ["SeamlessMap", "solve_seamless_map"]
+__all__ = ["SIZE_WEIGHT", "SeamlessMap", "solve_seamless_map"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-LEAST_SIZE_WEIGHT = 0.1
+SIZE_WEIGHT = 0.1  # least one of sizes, against directions
 FEW_FOLDS = 50  # that are worth unfolding by themselves
 RINGS = 4  # of triangles around them
 UNITS_PER_EDGE = 1 << 20
@@ -111,18 +111,23 @@ _PATIENCE = 8  # solves without fewer folds before the next schedule
 
 
 def solve_seamless_map(
-    aligned: AlignedField, *, on_solve: Callable[[int, int], None] | None = None
+    aligned: AlignedField,
+    *,
+    size_weight: float = SIZE_WEIGHT,
+    on_solve: Callable[[int, int], None] | None = None,
 ) -> SeamlessMap:
     """Seamless map of an aligned field; check ``is_valid`` on the result.
 
     Parameters
     ----------
     aligned : AlignedField
+    size_weight : float
+        Least weight of sizes against directions.
     on_solve : callable, optional
         Called with (solves so far, folded triangles) after each solve.
     """
     space = seamless_space(aligned)
-    problem = _Problem(aligned, space)
+    problem = _Problem(aligned, space, size_weight)
     solves = 0
 
     def attempt(weight: Floats) -> tuple[Floats, SeamlessMap]:
@@ -161,7 +166,7 @@ def solve_seamless_map(
 class _Problem:
     """The quadratic energy over the seamless space."""
 
-    def __init__(self, aligned: AlignedField, space: SeamlessSpace) -> None:
+    def __init__(self, aligned: AlignedField, space: SeamlessSpace, size_weight: float) -> None:
         mesh = aligned.mesh
         self.mesh = mesh
         self.wedge = space.wedge
@@ -176,7 +181,7 @@ class _Problem:
         normals = mesh.vertex_normals[mesh.faces]
         change = np.einsum("fk,fki->fi", self.gradient, normals)  # complex: d/dx + i d/dy
         turn = np.linalg.norm(change, axis=1) * size  # radians within a quad
-        self.size_weight = np.clip(turn, LEAST_SIZE_WEIGHT, 1.0)
+        self.size_weight = np.clip(turn, size_weight, 1.0)
         self.target = self.stretch * np.exp(1j * space.angle)
         self.basis = (space.basis / space.denominator).tocsr()
         self.transpose = self.basis.T.tocsr()

@@ -1,9 +1,9 @@
 """Polish of a quad mesh on its surface: unfold, square up, even out; curves and corners are kept.
 
-Vertices first spread until quads near squares, then descend a barrier energy that unfolds
-(:mod:`vhquad.quad.descent`); after each step they return to the surface or slide on their curve
-(:mod:`vhquad.quad.sliding`). Quads still poor get patch problems of their own. The best state met
-is returned: never more folded quads than came in.
+Vertices descend a barrier energy that unfolds (:mod:`vhquad.quad.descent`); after each step they
+return to the surface or slide on their curve (:mod:`vhquad.quad.sliding`). Quads still poor get
+patch problems of their own; where some stay folded, vertices spread first in another attempt. The
+best state met is returned: never more folded quads than came in.
 """
 
 from __future__ import annotations
@@ -29,8 +29,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-SPREADS = 2  # between which the directions of the field are looked up again
-SPREAD_ITERATIONS = 5
+SPREAD_ITERATIONS = 10
 POOR = 0.1  # a quad with a scaled Jacobian below this gets a patch problem of its own
 FOLDED_ROUNDS = ((4, 0), (4, 5), (4, 0))  # rings around, and steps of spreading
 POOR_ROUNDS = 2
@@ -46,7 +45,7 @@ def smooth_quads(
     surface: ClosestPoints,
     fixed: ArrayLike | None = None,
     curves: CurveConstraints | None = None,
-    iterations: int = 30,
+    iterations: int = 40,
     target_edge: ArrayLike | None = None,
     loosen: bool = False,
     guide: FieldGuide | None = None,
@@ -109,15 +108,13 @@ def smooth_quads(
     if hold.all() or iterations <= 0:
         return start.vertices
     factor = laplacian_factor(problem)
-    state = start
-    for _ in range(SPREADS):
-        state = spread(problem, state, factor, SPREAD_ITERATIONS)
-        problem, state = _guided(problem, state, guide)
-    state = _mended(problem, descend(problem, state, factor, iterations), POOR)
+    state = descend(problem, start, factor, iterations // 2)
+    problem, state = _guided(problem, state, guide)
+    state = _mended(problem, descend(problem, state, factor, iterations // 2), POOR)
     if state.folded.any():
-        # Spreading may drag quads out of thin parts; unfolding first is slower but stays.
-        other = descend(problem, _mended(problem, start, 0.0), factor, iterations, PATIENCE)
-        other = _mended(problem, other, POOR)
+        # Spreading opens what is crowded; not at first, since it drags quads out of thin parts.
+        other = spread(problem, start, factor, SPREAD_ITERATIONS)
+        other = _mended(problem, descend(problem, other, factor, iterations, PATIENCE), POOR)
         state = other if better(other, state) else state
     state = start if better(start, state) else state
     for _ in range(LOOSE_ROUNDS if loosen else 0):
