@@ -45,7 +45,7 @@ def smooth_quads(
     surface: ClosestPoints,
     fixed: ArrayLike | None = None,
     curves: CurveConstraints | None = None,
-    iterations: int = 40,
+    iterations: int = 60,
     target_edge: ArrayLike | None = None,
     loosen: bool = False,
     guide: FieldGuide | None = None,
