@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 __all__ = [
     "Distortion",
+    "barrier",
     "corner_jacobians",
     "cross",
     "distortion",
@@ -66,6 +67,13 @@ def corner_jacobians(vertices: Floats, quads: Ints, normals: Floats) -> Floats:
     return np.divide(area, scale, out=np.zeros_like(area), where=scale > 0)
 
 
+def barrier(d: Floats, epsilon: float) -> tuple[Floats, Floats]:
+    """√(D² + ε²) and χ(D), elementwise."""
+    root = np.sqrt(d * d + epsilon * epsilon)
+    # For D < 0 the second form has no cancellation.
+    return root, np.where(d > 0, 0.5 * (d + root), 0.5 * epsilon**2 / (root + np.abs(d)))
+
+
 @dataclass(frozen=True, eq=False)
 class Distortion:
     """Energy (sum over corners), its gradient (n, 3) and the signed corner areas D (k, 4)."""
@@ -109,9 +117,7 @@ def distortion(
     d = np.einsum("kci,ki->kc", cross(e1, e2), normals) * per_area
     squared = np.einsum("kci,kci->kc", e1, e1)
     stretch = 0.5 * (squared + squared[:, [3, 0, 1, 2]]) * per_area
-    root = np.sqrt(d * d + epsilon * epsilon)
-    # For D < 0 the second form has no cancellation.
-    chi = np.where(d > 0, 0.5 * (d + root), 0.5 * epsilon**2 / (root + np.abs(d)))
+    root, chi = barrier(d, epsilon)
     cost = (stretch + 0.5 * size_weight * (d * d + 1.0)) / chi
     if not with_gradient:
         return Distortion(float(cost.sum()), np.zeros((0, 3)), d)

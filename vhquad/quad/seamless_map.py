@@ -181,7 +181,8 @@ class _Problem:
         normals = mesh.vertex_normals[mesh.faces]
         change = np.einsum("fk,fki->fi", self.gradient, normals)  # complex: d/dx + i d/dy
         turn = np.linalg.norm(change, axis=1) * size  # radians within a quad
-        self.size_weight = np.clip(turn, size_weight, 1.0)
+        known = aligned.size is not None
+        self.size_weight = np.clip(turn if known else 1.0, size_weight, np.ones(mesh.n_faces))
         self.target = self.stretch * np.exp(1j * space.angle)
         self.basis = (space.basis / space.denominator).tocsr()
         self.transpose = self.basis.T.tocsr()

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import fmin_l_bfgs_b
 
+from vhquad.quad.distortion import barrier
 from vhquad.quad.map_energy import MapEnergy, determinants
 
 __all__ = ["untangled"]
@@ -60,8 +61,7 @@ def untangled(energy: MapEnergy, x: Floats, rings: int) -> Floats:
     def cost(y: Floats, epsilon: float) -> tuple[float, Floats]:
         frames = (base + jacobian @ y).reshape(-1, 4)
         d = determinants(frames)
-        root = np.sqrt(d * d + epsilon * epsilon)
-        chi = np.where(d > 0, 0.5 * (d + root), 0.5 * epsilon**2 / (root + np.abs(d)))
+        root, chi = barrier(d, epsilon)
         over = (frames**2).sum(axis=1) + 0.5 * SIZE_WEIGHT * (d * d + 1.0)
         by_d = (SIZE_WEIGHT * d - over / root) / chi
         slope = (2.0 / chi)[:, None] * frames + (2.0 * by_d)[:, None] * frames * SIGNS
