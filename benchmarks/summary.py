@@ -199,6 +199,7 @@ def main() -> None:
         "peers": peers(runs),
         "runs": table(HEADER, [line(run) for run in order]),
     }
+    options.out.mkdir(parents=True, exist_ok=True)
     for name, lines in texts.items():
         text = "\n".join([*heading(name, runs), "", *lines])
         (options.out / f"{name}.md").write_text(text.rstrip() + "\n")
