@@ -23,7 +23,7 @@ from vhquad.cache import default_cache_dir
 STEPS = {
     "read": ["vhquad.mesh.load.read_polygons", "vhquad.api.load_kept"],
     "repair": ["vhquad.mesh.load.repair"],
-    "stand-in": ["vhquad.api.make_stand_in"],
+    "stand-in": ["vhquad.quad.remeshing.make_stand_in"],
     "proxy": ["vhquad.learn.predict.make_proxy", "vhquad.learn.predict.carry_back"],
     "operators": ["vhquad.geometry.operators.build_operators"],
     "eigenpairs": ["vhquad.geometry.operators.smallest_eigenpairs"],
