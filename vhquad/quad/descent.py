@@ -96,9 +96,8 @@ def _solve(problem: Problem, factor: PositiveFactor, a: Floats) -> Floats:
     return out
 
 
-def _epsilon(area: Floats) -> float:
+def _epsilon(least: float) -> float:
     """Width of the barrier: wide while corners are folded, then almost sharp."""
-    least = float(area.min())
     return 1e-3 if least > 0.02 else min(0.3, max(1e-3, 0.16 * np.sqrt(max(-least, 0.0))))
 
 
@@ -129,7 +128,7 @@ def descend(
     while number < iterations or (best.folded.any() and number < best_at + patience):
         number += 1
         normals = state.quad_normals
-        epsilon = _epsilon(cost(problem, state.vertices, normals, 1.0, False).area)
+        epsilon = _epsilon(state.least)
         now = cost(problem, state.vertices, normals, epsilon)
         last, gradient = gradient, tangential(problem, state, now.gradient)
         if not 1 / 1.5 < epsilon / max(last_epsilon, 1e-300) < 1.5:

@@ -130,13 +130,18 @@ def distortion(
 
 
 def misalignment(
-    vertices: Floats, quads: Ints, normals: Floats, size: Floats, along: Floats
+    vertices: Floats,
+    quads: Ints,
+    normals: Floats,
+    size: Floats,
+    along: Floats,
+    with_gradient: bool = True,
 ) -> tuple[float, Floats]:
     """How far edges run off given directions: half the squared share of each edge across, by s².
 
     Parameters
     ----------
-    vertices, quads, normals, size
+    vertices, quads, normals, size, with_gradient
         As in :func:`distortion`.
     along : (k, 3) float64
         Unit direction for edges 0 and 2 of each quad, either way; edges 1 and 3 should run at a
@@ -152,8 +157,11 @@ def misalignment(
     across = np.stack([second, first, second, first], axis=1)
     p = vertices[quads]
     share = np.einsum("kci,kci->kc", p[:, [1, 2, 3, 0]] - p, across) / size[:, None]
+    energy = 0.5 * float((share**2).sum())
+    if not with_gradient:
+        return energy, np.zeros((0, 3))
     g = (share / size[:, None])[..., None] * across
-    return 0.5 * float((share**2).sum()), _gathered(g[:, [3, 0, 1, 2]] - g, quads, len(vertices))
+    return energy, _gathered(g[:, [3, 0, 1, 2]] - g, quads, len(vertices))
 
 
 def _gathered(corners: Floats, quads: Ints, n: int) -> Floats:

@@ -66,6 +66,7 @@ class State:
     quad_normals: Floats  # (k, 3) reference normals of the energy
     folded: Bools  # (k,)
     energy: float  # at the least epsilon, to rank states
+    least: float  # signed area of the worst corner, of the wanted square
 
 
 def folded_quads(vertices: Floats, quads: Ints, surface_normals: Floats) -> Bools:
@@ -157,8 +158,9 @@ def measure(problem: Problem, x: Floats, arc: Floats, normals: Floats, face: Int
     folded = inverted | ((facing <= 0) & (nearest <= 0))
     trusted = ~folded & ((facing > 0.3) | (nearest > 0.7))
     reference = np.where(trusted[:, None], own, around)
-    energy = cost(problem, x, reference, 1e-3, False).energy
-    return State(x, arc, normals, face, reference, folded, energy)
+    at = cost(problem, x, reference, 1e-3, False)
+    least = float(at.area.min())
+    return State(x, arc, normals, face, reference, folded, at.energy, least)
 
 
 def cost(
@@ -168,9 +170,8 @@ def cost(
     out = distortion(x, problem.quads, normals, problem.size, epsilon, SIZE_WEIGHT, with_gradient)
     if not problem.along.any():
         return out
-    off, pull = misalignment(x, problem.quads, normals, problem.size, problem.along)
-    gradient = out.gradient + GUIDANCE * pull if with_gradient else out.gradient
-    return replace(out, energy=out.energy + GUIDANCE * off, gradient=gradient)
+    off, pull = misalignment(x, problem.quads, normals, problem.size, problem.along, with_gradient)
+    return replace(out, energy=out.energy + GUIDANCE * off, gradient=out.gradient + GUIDANCE * pull)
 
 
 def reference_normals(problem: Problem, normals: Floats) -> Floats:
