@@ -14,19 +14,17 @@ from __future__ import annotations
 
 import argparse
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
-import anny
 import numpy as np
 import torch
-from anny.face_segmentation import get_face_segmentation_mask
 from make_heads import HeadMaker, make_set
 from scipy.spatial.transform import Rotation
 
 JOINTS = re.compile(r"^(upperleg01|lowerleg01|upperarm01|lowerarm01|spine0[1-5]|neck01|head)")
 TURN = {"upperleg01": 10.0, "lowerleg01": 10.0, "upperarm01": 20.0, "lowerarm01": 20.0}  # degrees
 TURN_ELSEWHERE = 5.0
-CAVITIES = ["eye_cavity.L", "eye_cavity.R", "mouth_cavity"]
 
 
 class BodyMaker(HeadMaker):
@@ -35,17 +33,8 @@ class BodyMaker(HeadMaker):
     kind = "body"
     most_self_intersections = 500
 
-    def __init__(self, seed: int = 0) -> None:
-        self.seed = seed
-        self.model = anny.Anny(
-            topology="anny-noeyes-notongue-quads",
-            phenotypes="all",
-            local_changes="default",
-            facial_actions="all",
-        )
-        self.quads = self.model.faces.numpy()
-        self.skin = ~get_face_segmentation_mask(self.model, CAVITIES).numpy()
-        self.local_names = list(self.model.local_change_labels)
+    model_options: Mapping[str, str] = {"topology": "anny-noeyes-notongue-quads"}
+    parts = re.compile("")  # all
 
     def _pose(self, rng: np.random.Generator) -> dict[str, torch.Tensor]:
         pose = {}

@@ -20,6 +20,7 @@ from __future__ import annotations
 import argparse
 import json
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import anny
@@ -33,6 +34,7 @@ from vhquad.learn.subdivide import catmull_clark
 from vhquad.learn.targets import isotropic_remesh, split_quads
 
 HEAD_PARTS = re.compile(r"^(head|forehead|eyebrows|mouth|nose|chin|neck|(l|r)-(eye|ear|cheek))-")
+CAVITIES = ["eye_cavity.L", "eye_cavity.R", "mouth_cavity"]
 SIDES = (("l-", "r-"), ("Left", "Right"))
 SCAN_IDENTITY = 1_000_000  # never reached by --count
 SCAN_VERTICES = 13_000
@@ -44,18 +46,23 @@ class HeadMaker:
     kind = "head"
     most_self_intersections = 150  # triangles
 
+    model_options: Mapping[str, str] = {
+        "rig": "makehuman-head",
+        "topology": "head-noeyes-notongue-quads",
+    }
+    parts = HEAD_PARTS  # whose local changes are drawn
+
     def __init__(self, seed: int = 0) -> None:
         self.seed = seed
         self.model = anny.Anny(
-            rig="makehuman-head",
-            topology="head-noeyes-notongue-quads",
+            **self.model_options,
             phenotypes="all",
             local_changes="default",
             facial_actions="all",
         )
         self.quads = self.model.faces.numpy()
-        self.skin = get_face_segmentation_mask(self.model, ["head"]).numpy()
-        self.local_names = [n for n in self.model.local_change_labels if HEAD_PARTS.match(n)]
+        self.skin = ~get_face_segmentation_mask(self.model, CAVITIES).numpy()
+        self.local_names = [n for n in self.model.local_change_labels if self.parts.match(n)]
 
     def draw(
         self, identity: int, skin_only: bool | None = None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -24,6 +24,7 @@ from vhquad.mesh.quality import check_quads
 from vhquad.mesh.repair import repair
 from vhquad.mesh.scalars import carried
 from vhquad.mesh.triangle import TriMesh
+from vhquad.quad.component import Progress
 from vhquad.quad.pipeline import RemeshResult, RemeshSettings
 from vhquad.quad.remeshing import remesh_predicted, remesh_with
 from vhquad.quad.sizing import SIZE_RANGE, checked_density
@@ -46,7 +47,6 @@ __all__ = [
 ]
 
 Method = Literal["learned", "curvature"]
-Progress = Callable[[str, float], None]
 
 
 def predict(

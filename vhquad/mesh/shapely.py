@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.flips import flip_edges
+from vhquad.mesh.rings import within_rings
 from vhquad.mesh.thinning import slim
 from vhquad.mesh.triangle import TriMesh
 
@@ -48,7 +49,7 @@ def shapely(mesh: TriMesh, free: Bools, keep: Ints, surface: ClosestPoints) -> T
         moved = np.array(mesh.vertices)
         moved[free] = surface.query(middle[free]).point
         before = np.array(mesh.face_normals)
-        doubtful = _around(mesh, slim(mesh))
+        doubtful = np.flatnonzero(within_rings(mesh.faces, slim(mesh)))
         beneath = surface.query(mesh.vertices[mesh.faces[doubtful]].mean(axis=1)).face
         before[doubtful] = surface.mesh.face_normals[beneath]
         for _ in range(UNDOING_ROUNDS):
@@ -60,10 +61,3 @@ def shapely(mesh: TriMesh, free: Bools, keep: Ints, surface: ClosestPoints) -> T
             moved[back] = mesh.vertices[back]
         mesh = TriMesh(moved, mesh.faces)
     return flip_edges(mesh, keep)
-
-
-def _around(mesh: TriMesh, core: Bools) -> Ints:
-    """Faces that share a vertex with some faces."""
-    touched = np.zeros(mesh.n_vertices, dtype=bool)
-    touched[mesh.faces[core]] = True
-    return np.flatnonzero(touched[mesh.faces].any(axis=1))

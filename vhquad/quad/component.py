@@ -145,7 +145,7 @@ def remesh_component(
         reasons.append(f"{folded} quads stay folded")
     if rough and not done:
         _, mapped, name = min(rough, key=lambda found: found[0])
-        done.append((0, mapped, _polished(mapped, surface, watch, tell), name))
+        done.append((0, mapped, _polished(mapped, surface, watch, tell), name))  # the only one
     uv: UvMap | None = None
     if done:
         _, mapped, quads, method = min(done, key=lambda found: found[0])

@@ -10,14 +10,12 @@ from numpy.typing import ArrayLike
 
 from vhquad.field.cross import CrossField
 from vhquad.mesh.triangle import TriMesh
-from vhquad.quad.component import PAIRED
+from vhquad.quad.component import PAIRED, Progress
 from vhquad.quad.pipeline import RemeshResult, RemeshSettings, remesh_mesh
 from vhquad.quad.stand_in import StandIn, make_stand_in
 from vhquad.watch import Watch
 
 __all__ = ["Predicted", "remesh_predicted", "remesh_with"]
-
-Progress = Callable[[str, float], None]
 
 GUESSED_QUADS = 10_000  # where only the field will say; predicted sizes make fewer, as a rule
 

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, diags
 
 from vhquad.field.align import AlignedField
+from vhquad.mesh.rings import within_rings
 from vhquad.mesh.triangle import TriMesh, next_halfedge
 from vhquad.quad.map_energy import MapEnergy, solve_positive
 from vhquad.quad.seamless import SeamlessSpace, seamless_space
@@ -181,8 +182,9 @@ class _Problem:
         normals = mesh.vertex_normals[mesh.faces]
         change = np.einsum("fk,fki->fi", self.gradient, normals)  # complex: d/dx + i d/dy
         turn = np.linalg.norm(change, axis=1) * size  # radians within a quad
-        known = aligned.size is not None
-        self.size_weight = np.clip(turn if known else 1.0, size_weight, np.ones(mesh.n_faces))
+        if aligned.size is None:
+            turn = np.ones(mesh.n_faces)
+        self.size_weight = np.clip(turn, size_weight, 1.0)
         self.target = self.stretch * np.exp(1j * space.angle)
         self.basis = (space.basis / space.denominator).tocsr()
         self.transpose = self.basis.T.tocsr()
@@ -235,10 +237,7 @@ class _Problem:
         bad = jacobian < schedule.share
         if schedule.distorted:
             bad |= off > 1.5**2
-        for _ in range(schedule.rings):
-            touched = np.zeros(self.mesh.n_vertices, dtype=bool)
-            touched[self.mesh.faces[bad]] = True
-            bad = touched[self.mesh.faces].any(axis=1)
+        bad = within_rings(self.mesh.faces, bad, schedule.rings)
         return np.where(bad, np.minimum(schedule.factor * weight, schedule.cap), weight)
 
 

@@ -17,6 +17,7 @@ from scipy.sparse.csgraph import connected_components
 
 from vhquad.errors import MeshError
 from vhquad.mesh.closest import ClosestPoints
+from vhquad.mesh.rings import within_rings
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.descent import better, descend, laplacian_factor, spread
 from vhquad.quad.distortion import corner_jacobians, cross
@@ -176,7 +177,7 @@ def _mended(problem: Problem, state: State, least: float) -> State:
     for rings, spreading in FOLDED_ROUNDS:
         if not state.folded.any():
             break
-        for patch in _components(problem, _rings(problem, state.folded, rings)):  # few
+        for patch in _components(problem, within_rings(problem.quads, state.folded, rings)):  # few
             state = _solve_patch(problem, state, patch, spreading, guided=False)
     if not state.folded.any():
         for _ in range(POOR_ROUNDS):
@@ -184,17 +185,10 @@ def _mended(problem: Problem, state: State, least: float) -> State:
             poor = jacobians.min(axis=1) < least
             if not poor.any():
                 break
-            state = _solve_patch(problem, state, _rings(problem, poor, POOR_RINGS), 0, guided=True)
+            state = _solve_patch(
+                problem, state, within_rings(problem.quads, poor, POOR_RINGS), 0, guided=True
+            )
     return state
-
-
-def _rings(problem: Problem, core: Bools, number: int) -> Bools:
-    """Quads within some rings of a core."""
-    for _ in range(number):
-        touched = np.zeros(len(problem.fixed), dtype=bool)
-        touched[problem.quads[core]] = True
-        core = np.asarray(touched[problem.quads].any(axis=1))
-    return core
 
 
 def _components(problem: Problem, inside: Bools) -> list[Bools]:

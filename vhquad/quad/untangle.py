@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import fmin_l_bfgs_b
 
+from vhquad.mesh.rings import within_rings
 from vhquad.quad.distortion import barrier
 from vhquad.quad.map_energy import MapEnergy, determinants
 
@@ -42,12 +43,8 @@ def untangled(energy: MapEnergy, x: Floats, rings: int) -> Floats:
     rings : int
         How far around the folded triangles the map may change.
     """
-    mesh = energy.mesh
     inside = determinants(energy.frames(x)) <= CLEAR
-    for _ in range(rings):
-        touched = np.zeros(mesh.n_vertices, dtype=bool)
-        touched[mesh.faces[inside]] = True
-        inside = np.asarray(touched[mesh.faces].any(axis=1))
+    inside = within_rings(energy.mesh.faces, inside, rings)
     rows = np.repeat(inside, 4)
     entries = energy.jacobian.astype(bool).astype(np.int64)
     free = np.flatnonzero((entries[~rows].sum(axis=0) == 0) & (entries[rows].sum(axis=0) > 0))
