@@ -80,19 +80,28 @@ def test_nothing_known_stays_unknown() -> None:
 
 
 def test_quads_follow_the_density() -> None:
-    """16 times as dense at one pole as at the other: 5.7 between the caps beyond z = 1/4.
+    """16 times as dense at one pole as at the other: 5.7 between the caps beyond 1/4 of the axis.
 
-    Half of it in the logarithm at least; without bending it was 3.4.
+    Which cross field a sphere gets is down to rounding, and with it how well it suits one axis (on
+    24 of them 5.3 to 6.6): so the mean over several. Without bending it was 3.4.
     """
     mesh = icosphere(4)
-    density = 16.0 ** (0.5 + 0.5 * mesh.vertices[:, 2])
+    field = curvature_field(mesh)
     settings = RemeshSettings(target_quads=800)
-    quads = remesh_mesh(mesh, curvature_field(mesh), settings, density=density).quads
-    p = quads.vertices[quads.quads]
-    area = 0.5 * np.linalg.norm(np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1]), axis=1)
-    z = p.mean(axis=1)[:, 2]
-    per_area = [(side > 0.25).sum() / area[side > 0.25].sum() for side in (z, -z)]
-    assert 4.0 < per_area[0] / per_area[1] < 8.0
+    axes = np.random.default_rng(0).standard_normal((5, 3))
+    axes /= np.linalg.norm(axes, axis=1)[:, None]
+    log_ratio = []
+    for axis in axes:
+        density = 16.0 ** (0.5 + 0.5 * mesh.vertices @ axis)
+        quads = remesh_mesh(mesh, field, settings, density=density).quads
+        p = quads.vertices[quads.quads]
+        area = 0.5 * np.linalg.norm(np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1]), axis=1)
+        height = p.mean(axis=1) @ axis
+        dense, coarse = (
+            (side > 0.25).sum() / area[side > 0.25].sum() for side in (height, -height)
+        )
+        log_ratio.append(np.log(dense / coarse))
+    assert 4.7 < np.exp(np.mean(log_ratio)) < 7.0
 
 
 # ---- sizes ----------------------------------------------------------------------------------
