@@ -60,6 +60,12 @@ def preprocess(
     rough: Annotated[
         float, typer.Option("--rough", help="Share of the further samples with a scan's noise.")
     ] = 0.2,
+    decimated: Annotated[
+        float,
+        typer.Option(
+            "--decimated", help="Share of all samples with triangles as decimation leaves them."
+        ),
+    ] = 0.3,
     val: Annotated[
         float, typer.Option("--val", help="Share of the shapes kept for validation.")
     ] = 0.1,
@@ -90,6 +96,7 @@ def preprocess(
             crops=crops,
             deform=deform,
             rough=rough,
+            decimated=decimated,
             val=val,
             test=test,
             features=features,

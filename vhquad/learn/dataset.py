@@ -12,7 +12,8 @@ Layout (version 2)::
      "features": "local", "turned": true, "k": 128, "in_channels": 48, "in_lines": 6, "order": 4,
      "samples": [{"name": "head_0001.t0", "shape": "head_0001", "source": "head_0001.obj",
                   "split": "train", "truth": true, "vertices": 3066, "leak": 0.03,
-                  "variant": "whole" | "deformed+cropped+rough" (in part) | "pair" | "plain",
+                  "variant": "whole" | "deformed+cropped+rough+decimated" (in part)
+                             | "pair" | "plain",
                   "key": hash of source and settings}],
      "skipped": [{"source": "broken.obj", "reason": "..."}]}
 

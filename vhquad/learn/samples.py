@@ -43,6 +43,9 @@ class PreprocessSettings:
         Share of the further samples that are deformed and perhaps mirrored.
     rough : float
         Share of the further samples with the noise of a scan.
+    decimated : float
+        Share of all samples with triangles as quadric decimation leaves them; the others have
+        isotropic ones.
     val, test : float
         Share of the shapes put aside; ``split.json`` in the folder ({"shape": "test", ...}) goes
         first. A shape is named by its path in the folder without suffix, "-" between the folders,
@@ -61,6 +64,7 @@ class PreprocessSettings:
     crops: float = 0.75
     deform: float = 0.0
     rough: float = 0.2
+    decimated: float = 0.3
     val: float = 0.1
     test: float = 0.0
     features: str = "local"
@@ -74,7 +78,7 @@ class PreprocessSettings:
         low, high = self.vertices
         if not 100 <= low <= high:
             raise ConfigError(f"--vertices must be a range from 100 up, not {low} to {high}")
-        for name in ("crops", "deform", "rough", "val", "test"):
+        for name in ("crops", "deform", "rough", "decimated", "val", "test"):
             value = getattr(self, name)
             if not 0.0 <= value <= 1.0:
                 raise ConfigError(f"--{name} must lie between 0 and 1, not {value}")
@@ -115,7 +119,10 @@ def make_sample(
     if index > 0 and rng.random() < settings.rough:
         variant.append("rough")
         change = partial(roughen, rng=rng)
-    target = make_target(vertices, quads, n_vertices, rng, crop, change)
+    decimated = bool(rng.random() < settings.decimated)
+    if decimated:
+        variant.append("decimated")
+    target = make_target(vertices, quads, n_vertices, rng, crop, change, decimated)
     return Made(target.mesh, target.field, "+".join(variant) or "whole")
 
 

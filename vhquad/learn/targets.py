@@ -1,8 +1,9 @@
 """From an artist's quads to a triangle mesh with the cross field that would have given them.
 
 1. One Catmull-Clark step (``subdivide.py``) remembers where each small quad lies in its parent.
-2. The small quads are split along random diagonals, cropped if wanted, and remeshed isotropically,
-   so that no triangle edge tells where the quads ran. :func:`leak` measures what it still tells.
+2. The small quads are split along random diagonals, cropped if wanted, and remeshed isotropically
+   or decimated, so that no triangle edge tells where the quads ran. :func:`leak` measures what it
+   still tells.
 3. Each vertex of the new mesh takes, at the closest point of the subdivided surface, the two edge
    vectors of its parent quad, interpolated.
 4. These are projected to the vertex frame: z = sum of the unit fourth powers, normalised; its
@@ -25,6 +26,7 @@ from vhquad.geometry.frames import build_frames, from_3d, vertex_axes
 from vhquad.learn.augment import clip_triangles
 from vhquad.learn.subdivide import SQUARE, SubdividedQuads, catmull_clark
 from vhquad.mesh.closest import ClosestPoints
+from vhquad.mesh.proxy import decimate
 from vhquad.mesh.triangle import TriMesh
 
 __all__ = ["Target", "isotropic_remesh", "leak", "make_target", "split_quads", "truth_at"]
@@ -35,6 +37,7 @@ Crop = Callable[[Floats, Floats], Floats]
 Change = Callable[[TriMesh], TriMesh]
 
 SUBDIVIDE_UP_TO = 12_000  # quads; finer meshes are fine enough as they are
+LEAST_DECIMATION = 4  # times fewer faces: else too many edges of the quads would be left
 SAME_SIDE = 0.5  # least cosine between the normals of a vertex and of its closest point
 
 
@@ -60,6 +63,7 @@ def make_target(
     rng: np.random.Generator,
     crop: Crop | None = None,
     change: Change | None = None,
+    decimated: bool = False,
 ) -> Target:
     """Make one training sample from a quad mesh.
 
@@ -75,6 +79,8 @@ def make_target(
         From fine vertices (N, 3) and their areas (N,) to a height (N,); what is below 0 is cut off.
     change : callable, optional
         From the remeshed mesh to another near it; its truth too is that of the fine surface.
+    decimated : bool
+        Triangles as quadric decimation leaves them, in place of isotropic ones.
 
     Returns
     -------
@@ -97,7 +103,7 @@ def make_target(
         v, f = clip_triangles(v, f, crop(v, surface.vertex_areas))
         if len(f) == 0:
             raise MeshError("the crop leaves nothing")
-    mesh = isotropic_remesh(v, f, n_vertices)
+    mesh = _decimated(v, f, n_vertices) if decimated else isotropic_remesh(v, f, n_vertices)
     if change is not None:
         mesh = change(mesh)
     return Target(mesh, truth_at(mesh, surface, fine, source, slots))
@@ -143,6 +149,17 @@ def isotropic_remesh(vertices: Floats, faces: Ints, n_vertices: int) -> TriMesh:
     if out.face_number() == 0:
         raise MeshError("remeshing left nothing")
     mesh = TriMesh(out.vertex_matrix(), out.face_matrix().astype(np.int64))
+    return _sound(mesh, n_vertices)
+
+
+def _decimated(vertices: Floats, faces: Ints, n_vertices: int) -> TriMesh:
+    """Decimate to about so many vertices, as scans often come, and keep the largest component."""
+    n_faces = min(2 * n_vertices, len(faces) // LEAST_DECIMATION)
+    return _sound(decimate(TriMesh(vertices, faces), n_faces), n_vertices)
+
+
+def _sound(mesh: TriMesh, n_vertices: int) -> TriMesh:
+    """The largest component; raises if it is not manifold or has too few vertices."""
     if mesh.n_components > 1:
         areas = np.bincount(mesh.face_component, weights=mesh.face_areas)
         mesh, _ = mesh.submesh(mesh.face_component == areas.argmax())
