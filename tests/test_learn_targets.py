@@ -43,6 +43,20 @@ def test_truth_on_a_torus(rng: np.random.Generator) -> None:
     assert field.confidence.min() > 0.99
 
 
+def test_truth_on_decimated_triangles(rng: np.random.Generator) -> None:
+    """1b. Vertices are near the torus, not on it; few edges of the quads are left however many."""
+    vertices, quads = quad_torus(60, 24)
+    for wanted in (700, 100_000):
+        target = make_target(vertices, quads, wanted, rng, decimated=True)
+        mesh, field = target.mesh, target.field
+        assert mesh.n_vertices == pytest.approx(min(wanted, 60 * 24), rel=0.02)
+        assert mesh.euler_characteristic == 0
+        angle = np.degrees(np.abs(np.angle(field.z * _along(mesh).conj()))) / 4.0
+        assert angle.mean() < 0.7
+        assert np.percentile(angle, 95) < 2.0
+        assert leak(mesh, field) < 0.15  # that of the quads cut in two is above 0.2
+
+
 def test_triangles_do_not_tell(rng: np.random.Generator) -> None:
     """2. The leak: large for split quads, small after remeshing, small for random fields."""
     vertices, quads = quad_torus(60, 24)

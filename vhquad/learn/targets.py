@@ -155,7 +155,7 @@ def isotropic_remesh(vertices: Floats, faces: Ints, n_vertices: int) -> TriMesh:
 def _decimated(vertices: Floats, faces: Ints, n_vertices: int) -> TriMesh:
     """Decimate to about so many vertices, as scans often come, and keep the largest component."""
     n_faces = min(2 * n_vertices, len(faces) // LEAST_DECIMATION)
-    return _sound(decimate(TriMesh(vertices, faces), n_faces), n_vertices)
+    return _sound(decimate(TriMesh(vertices, faces), n_faces), n_faces // 2)
 
 
 def _sound(mesh: TriMesh, n_vertices: int) -> TriMesh:
