@@ -26,7 +26,11 @@ def test_inverse_of_a_shifted_laplacian(
     shape = (mesh.n_vertices,) if columns is None else (mesh.n_vertices, columns)
     right = rng.normal(size=shape).astype(matrix.dtype)
     expected = np.linalg.solve(matrix.toarray(), right)
-    np.testing.assert_allclose(PositiveFactor(matrix).solve(right), expected, atol=1e-10)
+    factor = PositiveFactor(matrix)
+    np.testing.assert_allclose(factor.solve(right), expected, atol=1e-10)
+    rows = factor.order
+    np.testing.assert_array_equal(np.sort(rows), np.arange(len(right)))
+    np.testing.assert_allclose(factor.solve_in_order(right[rows]), expected[rows], atol=1e-10)
     single = np.complex64 if order else np.float32
     found = PositiveFactor(matrix.astype(single)).solve(right.astype(single))
     assert found.dtype == single
