@@ -149,3 +149,11 @@ def test_arrays_are_copies_and_read_only() -> None:
 def test_submesh_of_everything_is_the_mesh(case: Case) -> None:
     part, used = case.mesh.submesh(np.ones(case.mesh.n_faces, dtype=bool))
     np.testing.assert_array_equal(used[part.faces], case.mesh.faces)
+    assert part is case.mesh
+    # An index list may be in any order, and vertices that no face uses are left out.
+    backwards = np.arange(case.mesh.n_faces)[::-1]
+    part, used = case.mesh.submesh(backwards)
+    np.testing.assert_array_equal(used[part.faces], case.mesh.faces[::-1])
+    more = TriMesh(np.vstack([case.mesh.vertices, [[9.0, 9.0, 9.0]]]), case.mesh.faces)
+    part, used = more.submesh(np.ones(more.n_faces, dtype=bool))
+    assert part.n_vertices == case.mesh.n_vertices

@@ -57,8 +57,7 @@ class ClosestPoints:
 
     def __init__(self, mesh: TriMesh) -> None:
         self.mesh = mesh
-        self._vertices = np.array(mesh.vertices)
-        self._faces = np.array(mesh.faces)
+        self._vertices, self._faces = mesh.vertices, mesh.faces
         self._tree = igl.AABB()
         self._tree.init(self._vertices, self._faces)
 
@@ -102,13 +101,13 @@ class ClosestPoints:
         """
         p = np.array(points, dtype=np.float64)
         face = np.array(faces, dtype=np.int64)
-        beside = np.where(self.mesh.twin >= 0, self.mesh.twin // 3, -1).reshape(-1, 3)
+        twin = self.mesh.twin.reshape(-1, 3)
         barycentric, square = self._nearest_in(face, p)
         walking = np.arange(len(p))
         while len(walking):
             here = face[walking]
-            one = np.where(beside[here] >= 0, beside[here], here[:, None])
-            two = np.where(beside[one] >= 0, beside[one], one[:, :, None])
+            one = np.where(twin[here] >= 0, twin[here] // 3, here[:, None])
+            two = np.where(twin[one] >= 0, twin[one] // 3, one[:, :, None])
             following = np.concatenate([one, two.reshape(len(here), 9)], axis=1)
             weights, squares = self._nearest_in(
                 following.reshape(-1), np.repeat(p[walking], 12, axis=0)

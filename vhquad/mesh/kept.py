@@ -1,6 +1,7 @@
-"""Loaded meshes, kept by the content of the file: reading and repairing a large scan takes a while.
+"""Loaded meshes, kept by the content of the file: reading and repairing takes a while.
 
-Only files that hold all of a mesh are looked at, and only large ones.
+Only files that hold all of a mesh are looked at, and only those that take longer than a look into
+the cache.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from vhquad.mesh.triangle import TriMesh
 
 __all__ = ["load_kept"]
 
-LEAST_BYTES = 2_000_000
+LEAST_BYTES = 50_000  # some hundred vertices
 WHOLE = (".obj", ".ply", ".stl", ".off", ".glb")  # a .gltf names other files
 _INTEGERS = ("faces", "vertex_source", "face_source", "creases", "counts", "repaired")
 _COUNTS = ("polygons", "ignored_faces", "ignored_lines")

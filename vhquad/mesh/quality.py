@@ -88,14 +88,14 @@ class QualityReport:
         return asdict(self)
 
 
-def check_quads(mesh: QuadMesh, against: TriMesh | None = None) -> QualityReport:
+def check_quads(mesh: QuadMesh, against: TriMesh | ClosestPoints | None = None) -> QualityReport:
     """Judge a quad mesh.
 
     Parameters
     ----------
     mesh : QuadMesh
         Any; the worse it is, the more the report has to say.
-    against : TriMesh, optional
+    against : TriMesh or ClosestPoints, optional
         The surface it stands for: adds distances and quads facing the wrong way.
 
     Returns
@@ -107,7 +107,7 @@ def check_quads(mesh: QuadMesh, against: TriMesh | None = None) -> QualityReport
     length = mesh.edge_lengths if some else np.full(1, np.nan)
     distance, flipped = None, None
     if against is not None and some:
-        surface = ClosestPoints(against)
+        surface = against if isinstance(against, ClosestPoints) else ClosestPoints(against)
         own = ClosestPoints(TriMesh(mesh.vertices, mesh.triangles()))
         distance = surface_distance(own, surface)
         flipped = len(flipped_quads(mesh, surface))

@@ -329,7 +329,13 @@ class TriMesh:
     # ---- parts ----------------------------------------------------------------------------
 
     def submesh(self, face_mask: ArrayLike) -> tuple[TriMesh, Ints]:
-        """The faces of a mask or index list as a mesh, and the old indices of its vertices."""
-        chosen = self.faces[np.asarray(face_mask)]
+        """The faces of a mask or index list as a mesh, and the old indices of its vertices.
+
+        The mesh itself, with all that it knows already, if the mask leaves nothing out.
+        """
+        mask = np.asarray(face_mask)
+        if mask.dtype == np.bool_ and mask.all() and self.is_used_vertex.all():
+            return self, np.arange(self.n_vertices)
+        chosen = self.faces[mask]
         used, local = np.unique(chosen, return_inverse=True)
         return TriMesh(self.vertices[used], local.reshape(-1, 3)), used

@@ -135,6 +135,7 @@ def remesh_mesh(
     if onto is not None and settings.symmetry != "off":
         raise ConfigError("a stand-in cannot be mirrored; leave out --symmetry or onto")
     original = mesh if onto is None else onto
+    surface = ClosestPoints(original)
     watch = Watch()
     if field.domain == "vertices":
         if len(field) != mesh.n_vertices:
@@ -159,10 +160,10 @@ def remesh_mesh(
     size_weight = SIZE_WEIGHT if factor is None else 1.0  # who asks for a density wants it
     given = None if creases is None else np.asarray(creases, dtype=np.int64).reshape(-1, 2)
     result, parts, symmetry = _remesh(
-        mesh, field, given, settings, original, size_weight, with_uv, watch, progress
+        mesh, field, given, settings, surface, size_weight, with_uv, watch, progress
     )
     with watch("check"):
-        quality = check_quads(result, original)
+        quality = check_quads(result, surface)
     seconds = dict(watch.seconds)
     for part in parts:
         for step, value in part.report.seconds.items():
@@ -187,7 +188,7 @@ def _remesh(
     field: CrossField,
     given: Ints | None,
     settings: RemeshSettings,
-    original: TriMesh,
+    surface: ClosestPoints,
     size_weight: float,
     with_uv: bool,
     watch: Watch,
@@ -198,9 +199,9 @@ def _remesh(
     def remesh_parts(
         half: TriMesh, own: CrossField, creases: Ints | None, seam: Bools | None
     ) -> list[Part]:
-        surface = original if half is mesh else half
+        onto = surface if half is mesh else ClosestPoints(half)
         return _remesh_parts(
-            half, own, creases, seam, settings.crease, surface, size_weight, with_uv, progress
+            half, own, creases, seam, settings.crease, onto, size_weight, with_uv, progress
         )
 
     symmetry: SymmetryReport | None = None
@@ -224,12 +225,12 @@ def _remesh_parts(
     given: Ints | None,
     seam: Bools | None,
     angle: float | None,
-    original: TriMesh,
+    surface: ClosestPoints,
     size_weight: float,
     with_uv: bool,
     progress: Progress | None,
 ) -> list[Part]:
-    """Quads of every component by itself; the field has the sizes wanted."""
+    """Quads of every component by itself; the field has the sizes wanted, the surface all parts."""
     size = np.ones(mesh.n_faces) if field.size is None else field.size
     density = mesh.face_areas / size**2
     slack = SMALL_SHARE * float(density.sum())
@@ -258,9 +259,9 @@ def _remesh_parts(
         target = max(round(float(density[inside].sum())), LEAST_QUADS)
         edge = None if seam is None else seam.reshape(-1, 3)[inside].reshape(-1)
         whole = part
-        if original is not mesh:
-            whole, _ = original.submesh(original.face_component == number)
-        surface = ClosestPoints(whole)
+        if surface.mesh is not mesh:
+            whole, _ = surface.mesh.submesh(surface.mesh.face_component == number)
+        onto = surface if whole is surface.mesh else ClosestPoints(whole)
         parts.append(
             remesh_component(
                 part,
@@ -270,7 +271,7 @@ def _remesh_parts(
                 angle,
                 target,
                 slack,
-                surface,
+                onto,
                 size_weight,
                 with_uv,
                 tell,
