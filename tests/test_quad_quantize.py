@@ -15,7 +15,7 @@ from tests.tmesh_cases import lengths, row
 from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.triangle import TriMesh
 from vhquad.quad.layout import Layout, side_length
-from vhquad.quad.quantize import quantise
+from vhquad.quad.quantize import _Program, quantise
 
 
 def check_layout(s: Stages, layout: Layout) -> QuadMesh:
@@ -135,6 +135,32 @@ def test_a_row_by_hand() -> None:
     q = quantise(row(4, width=0.05, height=1.0), 5.0, 0.2)
     assert Counter(q.layout.lengths[:4].tolist())[0] < 4
     assert q.conditions > 0 or q.layout.lengths[:4].sum() > 0
+
+
+def test_rounding_up_spares_the_integer_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Rounding towards the wanted lengths ends between conditions here.
+    def never(self: object) -> None:
+        raise AssertionError("the integer program was asked")
+
+    monkeypatch.setattr(_Program, "_search", never)
+    s = stages("cone")
+    ways = []
+    rounded = _Program._rounded
+
+    def watched(self: _Program, real: np.ndarray, up: bool) -> np.ndarray | None:
+        ways.append(up)
+        return rounded(self, real, up)
+
+    monkeypatch.setattr(_Program, "_rounded", watched)
+    found = quantise(s.tmesh, 400, s.seamless.area)
+    assert True in ways
+    check_layout(s, found.layout)
+    assert found.n_quads == pytest.approx(400, rel=0.1)
+
+
+def test_nothing_is_written_to_the_standard_output(capfd: pytest.CaptureFixture[str]) -> None:
+    quantise(row(3, width=1.0, height=2.0), 24.0, 6.0)
+    assert capfd.readouterr().out == ""
 
 
 def test_same_again() -> None:

@@ -20,6 +20,7 @@ from scipy.sparse import coo_matrix, csr_matrix, hstack
 from scipy.sparse.csgraph import connected_components
 
 from vhquad.errors import ParametrizationError
+from vhquad.quad.highs import silent_solver
 from vhquad.quad.layout import Layout, build_layout, side_length
 from vhquad.quad.separation import Condition, loop_conditions, separation_conditions
 from vhquad.quad.tmesh import TMesh
@@ -107,7 +108,7 @@ def _between(
     while fewer and more and len(made) < MOST_BUDGETS:
         low = max(fewer, key=lambda r: r.n_quads)
         high = min(more, key=lambda r: r.n_quads)
-        if abs(np.log(low.n_quads / target)) <= np.log1p(COUNT_TOLERANCE):
+        if min(abs(np.log(r.n_quads / target)) for r in (low, high)) <= np.log1p(COUNT_TOLERANCE):
             break
         form = _count_form(program.tmesh, low.layout.lengths + high.layout.lengths)
         have = sum(factor * int(low.layout.lengths[arc]) for arc, factor in form)
@@ -179,8 +180,7 @@ class _Program:
         self.sides = coo_matrix((entries, places), shape=shape).tocsr()
         self.sides.sum_duplicates()
         self.known: list[Condition] = []
-        self.solver = highspy.Highs()
-        self.solver.silent()
+        self.solver = silent_solver()
         self.wanted = self.lengths
         self.base = np.floor(self.wanted)
         self._load()
@@ -282,42 +282,47 @@ class _Program:
     def solve(self) -> Ints:
         """Best integer lengths found under the conditions.
 
-        Lengths that come out fractional hang together in chains; one of each chain is rounded and
-        the program solved again, until all are whole.
+        By rounding towards the wanted lengths; where conditions then cannot be met any more, up,
+        which most of them ask for; else by the integer program.
         """
-        low, high = np.zeros(self.size), np.full(self.size, np.inf)
         real = self._run()
         if real is None:
             raise ParametrizationError("the arc lengths of the T-mesh contradict each other")
+        for up in (False, True):
+            whole = self._rounded(real, up)
+            self._bound(np.zeros(self.size), np.full(self.size, np.inf))
+            if whole is not None:
+                return whole
+        return self._search()
+
+    def _rounded(self, real: Floats, up: bool) -> Ints | None:
+        """Integer lengths near real ones, or None; leaves bounds on the lengths.
+
+        Lengths that come out fractional hang together in chains; one of each chain is rounded and
+        the program solved again, until all are whole.
+        """
         for _ in range(MOST_DIVES):
             off = np.abs(real - np.round(real)) > 1e-6
             if not off.any():
-                break
+                return np.round(real).astype(np.int64)
             pick = self._one_a_chain(off)
             for batch in (pick, pick[:1]):
-                # Towards the wanted length; a half can go either way.
-                value = np.where(
-                    self.wanted[batch] < real[batch], np.floor(real[batch]), np.ceil(real[batch])
-                )
+                # A half can go either way.
+                down = (self.wanted[batch] < real[batch]) & (not up)
+                value = np.where(down, np.floor(real[batch]), np.ceil(real[batch]))
                 self._bound(value, value, batch)
                 following = self._run()
                 if following is not None:
-                    real = following
                     break
-                self._bound(low[batch], high[batch], batch)
+                self._bound(np.zeros(len(batch)), np.full(len(batch), np.inf), batch)
             else:
                 other = np.floor(real[batch]) + np.ceil(real[batch]) - value
                 self._bound(other, other, batch)
                 following = self._run()
                 if following is None:
-                    self._bound(low, high)
-                    return self._search()
-                real = following
-        else:
-            self._bound(low, high)
-            return self._search()
-        self._bound(low, high)
-        return np.round(real).astype(np.int64)
+                    return None
+            real = following
+        return None
 
     def _one_a_chain(self, off: NDArray[np.bool_]) -> Ints:
         """The weightiest fractional arc of each chain of fractional arcs."""
