@@ -68,6 +68,7 @@ def child(words: list[str], cache: Path, log: Path) -> Result:
     threads = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "MKL", "OPENBLAS")}
     start = time.time()
     environment = {**os.environ, **threads, "VHQUAD_CACHE": str(cache), "SPEED_BEGAN": str(start)}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)  # what pip installs is compiled already
     with log.open("w") as file:
         process = subprocess.Popen(words, stdout=file, stderr=subprocess.STDOUT, env=environment)
         _, status, usage = os.wait4(process.pid, 0)

@@ -19,7 +19,15 @@ from vhquad.errors import MeshError
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.quad import QuadMesh
 from vhquad.quad.curves import CurveConstraints
-from vhquad.quad.distortion import corner_jacobians, distortion, misalignment, quad_normals
+from vhquad.quad.distortion import (
+    corner_jacobians,
+    cross,
+    distortion,
+    last_corner,
+    misalignment,
+    next_corner,
+    quad_normals,
+)
 from vhquad.quad.embed import embed_layout
 from vhquad.quad.guide import FieldGuide
 from vhquad.quad.sliding import folded_quads
@@ -174,6 +182,14 @@ def test_gradient_is_that_of_the_energy(rng: np.random.Generator) -> None:
         # Central differences: error about h², far below the tolerance.
         slope = (at.gradient * direction).sum()
         assert (ahead - behind) / (2 * h) == pytest.approx(slope, rel=1e-5)
+
+
+def test_cross_products_and_neighbouring_corners(rng: np.random.Generator) -> None:
+    a, b = rng.normal(size=(2, 7, 4, 3))
+    np.testing.assert_array_equal(cross(a, b), np.cross(a, b))
+    np.testing.assert_array_equal(cross(a, b[:, :1]), np.cross(a, b[:, :1]))  # broadcast
+    np.testing.assert_array_equal(next_corner(a), np.roll(a, -1, axis=1))
+    np.testing.assert_array_equal(last_corner(a[..., 0]), np.roll(a[..., 0], 1, axis=1))
 
 
 def test_edges_off_a_direction_cost_their_share_across() -> None:

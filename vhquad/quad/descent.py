@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, diags_array
 
 from vhquad.geometry.sparse import PositiveFactor
-from vhquad.quad.distortion import cross, unit
+from vhquad.quad.distortion import cross, last_corner, next_corner, unit
 from vhquad.quad.sliding import (
     GUIDANCE,
     Problem,
@@ -47,7 +47,7 @@ def spread(problem: Problem, state: State, factor: PositiveFactor, iterations: i
     for _ in range(iterations):
         n = reference_normals(problem, state.normals)
         p = state.vertices[quads]
-        edge = p[:, [1, 2, 3, 0]] - p
+        edge = next_corner(p) - p
         # Edges of a square: d, n x d, -d, -(n x d); the least squares fit of d, in the plane.
         d = edge[:, 0] - edge[:, 2] + cross(edge[:, 1] - edge[:, 3], n)
         d -= np.einsum("ki,ki->k", d, n)[:, None] * n
@@ -56,7 +56,7 @@ def spread(problem: Problem, state: State, factor: PositiveFactor, iterations: i
         turned = cross(n, d)
         wanted = np.stack([d, turned, -d, -turned], axis=1)
         pull = (wanted - edge) / (problem.size**2)[:, None, None]
-        force = pull[:, [3, 0, 1, 2]] - pull
+        force = last_corner(pull) - pull
         total = [
             np.bincount(corners, force[..., i].reshape(-1), len(problem.fixed)) for i in range(3)
         ]

@@ -25,7 +25,9 @@ __all__ = [
     "corner_jacobians",
     "cross",
     "distortion",
+    "last_corner",
     "misalignment",
+    "next_corner",
     "quad_normals",
     "unit",
 ]
@@ -42,11 +44,24 @@ def unit(a: Floats) -> Floats:
 
 def cross(a: Floats, b: Floats) -> Floats:
     """Cross products along the last axis, several times faster than ``np.cross``."""
-    a, b = np.broadcast_arrays(a, b)
-    out = np.zeros(a.shape)
-    out[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
-    out[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
-    out[..., 2] = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        np.multiply(a[..., j], b[..., k], out=out[..., i])
+        out[..., i] -= a[..., k] * b[..., j]
+    return out
+
+
+def next_corner(a: Floats) -> Floats:
+    """What the next corner of each quad has, (k, 4, ...): ``a[:, [1, 2, 3, 0]]``, but faster."""
+    out = np.empty_like(a)
+    out[:, :3], out[:, 3] = a[:, 1:], a[:, 0]
+    return out
+
+
+def last_corner(a: Floats) -> Floats:
+    """What the corner before has: ``a[:, [3, 0, 1, 2]]``."""
+    out = np.empty_like(a)
+    out[:, 1:], out[:, 0] = a[:, :3], a[:, 3]
     return out
 
 
@@ -59,11 +74,11 @@ def quad_normals(vertices: Floats, quads: Ints) -> Floats:
 def corner_jacobians(vertices: Floats, quads: Ints, normals: Floats) -> Floats:
     """Scaled Jacobian at each corner against given quad normals; (k, 4), 0 at empty edges."""
     p = vertices[quads]
-    forward = p[:, [1, 2, 3, 0]] - p
-    backward = p[:, [3, 0, 1, 2]] - p
+    forward = next_corner(p) - p
+    backward = last_corner(p) - p
     area = np.einsum("kci,ki->kc", cross(forward, backward), normals)
     length = np.sqrt(np.einsum("kci,kci->kc", forward, forward))
-    scale = length * length[:, [3, 0, 1, 2]]
+    scale = length * last_corner(length)
     return np.divide(area, scale, out=np.zeros_like(area), where=scale > 0)
 
 
@@ -110,13 +125,13 @@ def distortion(
         Without it the gradient is left empty, at half the time.
     """
     p = vertices[quads]
-    e1 = p[:, [1, 2, 3, 0]] - p
-    e2 = -e1[:, [3, 0, 1, 2]]
+    e1 = next_corner(p) - p
+    e2 = -last_corner(e1)
     n = normals[:, None, :]
     per_area = (1.0 / size**2)[:, None]
     d = np.einsum("kci,ki->kc", cross(e1, e2), normals) * per_area
     squared = np.einsum("kci,kci->kc", e1, e1)
-    stretch = 0.5 * (squared + squared[:, [3, 0, 1, 2]]) * per_area
+    stretch = 0.5 * (squared + last_corner(squared)) * per_area
     root, chi = barrier(d, epsilon)
     cost = (stretch + 0.5 * size_weight * (d * d + 1.0)) / chi
     if not with_gradient:
@@ -125,7 +140,7 @@ def distortion(
     by_area = (size_weight * d / chi - cost / root)[..., None] * per_area[..., None]
     g1 = by_stretch * e1 + by_area * cross(e2, n)
     g2 = by_stretch * e2 + by_area * cross(n, e1)
-    g = g1[:, [3, 0, 1, 2]] + g2[:, [1, 2, 3, 0]] - g1 - g2
+    g = last_corner(g1) + next_corner(g2) - g1 - g2
     return Distortion(float(cost.sum()), _gathered(g, quads, len(vertices)), d)
 
 
@@ -156,12 +171,12 @@ def misalignment(
     second = cross(normals, first)
     across = np.stack([second, first, second, first], axis=1)
     p = vertices[quads]
-    share = np.einsum("kci,kci->kc", p[:, [1, 2, 3, 0]] - p, across) / size[:, None]
+    share = np.einsum("kci,kci->kc", next_corner(p) - p, across) / size[:, None]
     energy = 0.5 * float((share**2).sum())
     if not with_gradient:
         return energy, np.zeros((0, 3))
     g = (share / size[:, None])[..., None] * across
-    return energy, _gathered(g[:, [3, 0, 1, 2]] - g, quads, len(vertices))
+    return energy, _gathered(last_corner(g) - g, quads, len(vertices))
 
 
 def _gathered(corners: Floats, quads: Ints, n: int) -> Floats:
