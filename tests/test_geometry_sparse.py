@@ -31,6 +31,13 @@ def test_inverse_of_a_shifted_laplacian(
     rows = factor.order
     np.testing.assert_array_equal(np.sort(rows), np.arange(len(right)))
     np.testing.assert_allclose(factor.solve_in_order(right[rows]), expected[rows], atol=1e-10)
+    other = csr_matrix(laplacian + 3.0 * diags_array(np.ones(mesh.n_vertices)))
+    again = PositiveFactor(other, like=factor)
+    expected_again = np.linalg.solve(other.toarray(), right)
+    np.testing.assert_allclose(again.solve(right), expected_again, atol=1e-10)
+    third = PositiveFactor(matrix, like=again)
+    np.testing.assert_allclose(third.solve(right), expected, atol=1e-10)
+    np.testing.assert_array_equal(third.order, again.order)  # nothing left to permute
     single = np.complex64 if order else np.float32
     found = PositiveFactor(matrix.astype(single)).solve(right.astype(single))
     assert found.dtype == single

@@ -17,7 +17,6 @@ motion and change of scale, not bending.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -109,14 +108,18 @@ def local_curvature(
     scalar, lines = cotan_laplacian(tri), connection_laplacian(tri, order=2)
     gradient = gradient_operator(tri)
     found: tuple[list[NDArray], ...] = ([], [], [], [], [])
+    step: PositiveFactor | None = None
+    turn: PositiveFactor | None = None
     for radius in radii:
-        near = _smoother(scalar, mass, radius**2)(numbers)
+        step = _step(scalar, mass, radius**2, step)
+        turn = _step(lines, mass, radius**2, turn)
+        near = _smoothed(step, mass, numbers)
         gaussian = np.divide(near[:, 1], near[:, 2], out=np.zeros(n), where=near[:, 2] > 1e-12)
         found[0].append(radius**2 * gaussian)
         found[1].append(radius * near[:, 0])
         found[2].append(radius**3 * (gradient @ gaussian))
         found[3].append(radius**2 * (gradient @ near[:, 0]))
-        found[4].append(radius * _smoother(lines, mass, radius**2)(line / mass))
+        found[4].append(radius * _smoothed(turn, mass, line / mass))
     return LocalCurvature(*(np.stack(part, axis=1) for part in found))
 
 
@@ -145,15 +148,16 @@ def _compressed(x: Complexes) -> Complexes:
     return x * np.divide(np.arcsinh(length), length, out=np.ones_like(length), where=length > 1e-9)
 
 
-def _smoother(laplacian: csr_matrix, mass: Floats, time: float) -> Callable[[NDArray], NDArray]:
-    """Heat diffusion for a time, in ``STEPS`` implicit Euler steps of one factorisation."""
-    system = diags_array(mass) + time / STEPS * laplacian
-    factor = PositiveFactor(system)
+def _step(
+    laplacian: csr_matrix, mass: Floats, time: float, like: PositiveFactor | None
+) -> PositiveFactor:
+    """Factor of one of ``STEPS`` implicit Euler steps of heat diffusion for a time."""
+    return PositiveFactor(diags_array(mass) + time / STEPS * laplacian, like)
 
-    def smooth(u: NDArray) -> NDArray:
-        weight = mass.reshape((-1,) + (1,) * (u.ndim - 1))
-        for _ in range(STEPS):
-            u = factor.solve(weight * u)
-        return u
 
-    return smooth
+def _smoothed(step: PositiveFactor, mass: Floats, u: NDArray) -> NDArray:
+    """Values (n,) or (n, c) after all steps."""
+    weight = mass.reshape((-1,) + (1,) * (u.ndim - 1))
+    for _ in range(STEPS):
+        u = step.solve(weight * u)
+    return u

@@ -22,6 +22,9 @@ class PositiveFactor:
     ----------
     matrix : (n, n) sparse
         Real or complex, single or double precision.
+    like : PositiveFactor, optional
+        Of a matrix with about the same entries: its elimination order is taken over, which is a
+        third of the work.
 
     Attributes
     ----------
@@ -29,13 +32,16 @@ class PositiveFactor:
         Row i of the factor is row ``order[i]`` of the matrix.
     """
 
-    def __init__(self, matrix: Any) -> None:
-        self.order = np.random.default_rng(0).permutation(matrix.shape[0])
+    def __init__(self, matrix: Any, like: PositiveFactor | None = None) -> None:
+        if like is None:
+            self.order = np.random.default_rng(0).permutation(matrix.shape[0])
+        else:
+            self.order = like.order[np.argsort(like._factor.perm_c)]
         shuffled = matrix.tocsr()[self.order][:, self.order]
         # Without pivoting the ordering holds, and the factor stays sparse.
-        self._factor = splu(
+        self._factor: Any = splu(
             csc_matrix(shuffled),
-            permc_spec="MMD_AT_PLUS_A",
+            permc_spec="MMD_AT_PLUS_A" if like is None else "NATURAL",
             diag_pivot_thresh=0.0,
             options={"SymmetricMode": True},
         )

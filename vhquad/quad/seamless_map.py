@@ -22,9 +22,10 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, diags
 
 from vhquad.field.align import AlignedField
+from vhquad.geometry.sparse import PositiveFactor
 from vhquad.mesh.rings import within_rings
 from vhquad.mesh.triangle import TriMesh, next_halfedge
-from vhquad.quad.map_energy import MapEnergy, solve_positive
+from vhquad.quad.map_energy import MapEnergy
 from vhquad.quad.seamless import SeamlessSpace, seamless_space
 from vhquad.quad.untangle import untangled
 
@@ -189,6 +190,7 @@ class _Problem:
         self.basis = (space.basis / space.denominator).tocsr()
         self.transpose = self.basis.T.tocsr()
         self.denominator = space.denominator
+        self._factor: PositiveFactor | None = None  # of the last solve; weights alone change
 
     @cached_property
     def energy(self) -> MapEnergy:
@@ -216,7 +218,9 @@ class _Problem:
         # Charts may drift together where nothing ties them down: hold them softly. The wanted
         # gradients do not care, so a weak pull on all unknowns changes nothing visible.
         matrix = matrix + diags(np.full(matrix.shape[0], 1e-9 * matrix.diagonal().mean()))
-        return solve_positive(matrix.tocsr(), np.asarray(self.transpose @ right))
+        factor = PositiveFactor(matrix, like=self._factor)
+        self._factor = factor
+        return np.asarray(factor.solve(np.asarray(self.transpose @ right)))
 
     def corners(self, unknowns: Floats) -> NDArray[np.complex128]:
         """Chart coordinates of the corners; (m, 3) complex."""
