@@ -2,9 +2,10 @@
 
 The field is aligned (:mod:`vhquad.field.align`), turned into a seamless map
 (:mod:`vhquad.quad.seamless_map`), cut into rectangles (:mod:`vhquad.quad.tmesh`), quantised
-(:mod:`vhquad.quad.quantize`), laid on the surface (:mod:`vhquad.quad.embed`) and polished
-(:mod:`vhquad.quad.smooth`). Where no valid map is found the field is smoothed further, then
-creases are given up, and at last triangles are paired (:mod:`vhquad.quad.fallback`).
+(:mod:`vhquad.quad.quantize`), laid on the surface (:mod:`vhquad.quad.embed`), polished
+(:mod:`vhquad.quad.smooth`) and freed of the last folds (:mod:`vhquad.quad.lift`). Where no valid
+map is found the field is smoothed further, then creases are given up, and at last triangles are
+paired (:mod:`vhquad.quad.fallback`).
 """
 
 from __future__ import annotations
@@ -21,7 +22,6 @@ from vhquad.field.creases import TOGETHER, creases_for_quads
 from vhquad.field.cross import CrossField
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.quad import QuadMesh
-from vhquad.mesh.quality import scaled_jacobians
 from vhquad.mesh.triangle import TriMesh
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.embed import embed_layout
@@ -29,6 +29,7 @@ from vhquad.quad.fallback import triangles_to_quads
 from vhquad.quad.guide import FieldGuide
 from vhquad.quad.integer_map import integer_map
 from vhquad.quad.layout import Layout
+from vhquad.quad.lift import lifted, wrong_quads
 from vhquad.quad.motorcycle import Tracing, trace
 from vhquad.quad.parts import Part, UvMap
 from vhquad.quad.quantize import quantise
@@ -138,11 +139,11 @@ def remesh_component(
             reasons.append(f"{made} quads where {target} were asked for")
             continue
         quads = _polished(mapped, surface, watch, tell)
-        folded = int((scaled_jacobians(quads) <= 0).any(axis=1).sum())
-        done.append((folded, mapped, quads, attempt.name))
-        if folded == 0 or len(done) == MOST_POLISHED:
+        wrong = int(wrong_quads(quads.vertices, quads.quads, surface).sum())
+        done.append((wrong, mapped, quads, attempt.name))
+        if wrong == 0 or len(done) == MOST_POLISHED:
             break
-        reasons.append(f"{folded} quads stay folded")
+        reasons.append(f"{wrong} quads stay folded")
     if rough and not done:
         _, mapped, name = min(rough, key=lambda found: found[0])
         done.append((0, mapped, _polished(mapped, surface, watch, tell), name))  # the only one
@@ -217,7 +218,7 @@ def _by_map(
 
 
 def _polished(mapped: _Mapped, surface: ClosestPoints, watch: Watch, tell: Progress) -> QuadMesh:
-    """The quads with their vertices moved on the surface to even shapes and sizes."""
+    """The quads with their vertices moved to even shapes, on the surface but at the last folds."""
     tell("polish", 0.75)
     quads = mapped.quads
     with watch("polish"):
@@ -228,9 +229,10 @@ def _polished(mapped: _Mapped, surface: ClosestPoints, watch: Watch, tell: Progr
             surface,
             fixed,
             curves,
-            loosen=True,
             guide=FieldGuide(mapped.aligned),
         )
+    with watch("unfold"):
+        moved = lifted(moved, quads.quads, surface, fixed | (curves.curve >= 0))
     return QuadMesh(moved, quads.quads)
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, diags_array
 
 from vhquad.geometry.sparse import PositiveFactor
-from vhquad.quad.distortion import cross, last_corner, next_corner, unit
+from vhquad.quad.distortion import barrier_width, cross, last_corner, next_corner, unit
 from vhquad.quad.sliding import (
     GUIDANCE,
     Problem,
@@ -96,11 +96,6 @@ def _solve(problem: Problem, factor: PositiveFactor, a: Floats) -> Floats:
     return out
 
 
-def _epsilon(least: float) -> float:
-    """Width of the barrier: wide while corners are folded, then almost sharp."""
-    return 1e-3 if least > 0.02 else min(0.3, max(1e-3, 0.16 * np.sqrt(max(-least, 0.0))))
-
-
 def descend(
     problem: Problem, state: State, factor: PositiveFactor, iterations: int, patience: int = 0
 ) -> State:
@@ -128,7 +123,7 @@ def descend(
     while number < iterations or (best.folded.any() and number < best_at + patience):
         number += 1
         normals = state.quad_normals
-        epsilon = _epsilon(state.least)
+        epsilon = barrier_width(state.least)
         now = cost(problem, state.vertices, normals, epsilon)
         last, gradient = gradient, tangential(problem, state, now.gradient)
         if not 1 / 1.5 < epsilon / max(last_epsilon, 1e-300) < 1.5:

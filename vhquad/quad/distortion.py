@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 __all__ = [
     "Distortion",
     "barrier",
+    "barrier_width",
     "corner_jacobians",
     "cross",
     "distortion",
@@ -87,6 +88,11 @@ def barrier(d: Floats, epsilon: float) -> tuple[Floats, Floats]:
     root = np.sqrt(d * d + epsilon * epsilon)
     # For D < 0 the second form has no cancellation.
     return root, np.where(d > 0, 0.5 * (d + root), 0.5 * epsilon**2 / (root + np.abs(d)))
+
+
+def barrier_width(least: float) -> float:
+    """ε for a least D: wide while corners are folded, then almost sharp."""
+    return 1e-3 if least > 0.02 else min(0.3, max(1e-3, 0.16 * float(np.sqrt(max(-least, 0.0)))))
 
 
 @dataclass(frozen=True, eq=False)

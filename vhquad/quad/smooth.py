@@ -37,7 +37,6 @@ POOR_ROUNDS = 2
 POOR_RINGS = 4
 PATCH_ITERATIONS = 40
 PATIENCE = 60
-LOOSE_ROUNDS = 3
 
 
 def smooth_quads(
@@ -48,7 +47,6 @@ def smooth_quads(
     curves: CurveConstraints | None = None,
     iterations: int = 60,
     target_edge: ArrayLike | None = None,
-    loosen: bool = False,
     guide: FieldGuide | None = None,
 ) -> Floats:
     """Move the vertices of a quad mesh over its surface until quads are unfolded and square.
@@ -70,9 +68,6 @@ def smooth_quads(
     target_edge : (n,) array_like, optional
         Wanted edge length near each vertex. Default: the given distribution, smoothed. Only
         ratios count, since the sizes are scaled to fill the surface.
-    loosen : bool
-        Let the inner fixed and bound vertices of quads that stay folded go from their places and
-        curves (creases), on the surface; those on the boundary of the quads never.
     guide : FieldGuide, optional
         Field whose directions the edges should keep.
 
@@ -117,13 +112,7 @@ def smooth_quads(
         other = spread(problem, start, factor, SPREAD_ITERATIONS)
         other = _mended(problem, descend(problem, other, factor, iterations, PATIENCE), POOR)
         state = other if better(other, state) else state
-    state = start if better(start, state) else state
-    for _ in range(LOOSE_ROUNDS if loosen else 0):
-        if not state.folded.any():
-            break
-        problem = _loosened(problem, state)
-        state = _mended(problem, state, 0.0)
-    return state.vertices
+    return (start if better(start, state) else state).vertices
 
 
 def smoothed_sizes(vertices: Floats, quads: Ints, area: float, rounds: int = 8) -> Floats:
@@ -150,26 +139,6 @@ def _guided(problem: Problem, state: State, guide: FieldGuide | None) -> tuple[P
     along = guide.along(p.mean(axis=1), p[:, 1] - p[:, 0] + p[:, 2] - p[:, 3])
     problem = replace(problem, along=along)
     return problem, measure(problem, state.vertices, state.arc, state.normals, state.face)
-
-
-def _loosened(problem: Problem, state: State) -> Problem:
-    """The problem without the constraints of the folded quads' vertices, boundary ones apart."""
-    tail, head = problem.quads, np.roll(problem.quads, -1, axis=1)
-    key = np.minimum(tail, head) * np.int64(len(problem.fixed)) + np.maximum(tail, head)
-    _, edge, count = np.unique(key, return_inverse=True, return_counts=True)
-    rim = (count[edge] == 1).reshape(key.shape)
-    let_go = np.zeros(len(problem.fixed), dtype=bool)
-    let_go[problem.quads[state.folded]] = True
-    let_go[tail[rim]] = let_go[head[rim]] = False
-    curves = problem.curves.bind(np.where(let_go, -1, problem.curves.curve))
-    return make_problem(
-        problem.quads,
-        problem.surface,
-        curves,
-        problem.fixed & ~let_go,
-        problem.size,
-        problem.along,
-    )
 
 
 def _mended(problem: Problem, state: State, least: float) -> State:
