@@ -92,19 +92,20 @@ def no_fallback(run: Result) -> bool:
 
 
 def extra_irregular(run: Result) -> float:
-    """Interior irregular vertices too many or too few for the singularities of the field.
+    """Interior irregular vertices too many or too few for those of the field.
 
-    Exact where the input has no sharp edges. Where creases are kept, their corners are irregular
-    vertices but no singularities; which of the sharp edges were kept the judge does not know, so
-    there the singularities must be all of those off sharp edges, and among those inside.
+    The field's are its singularities and, where creases are kept, those of their corners that have
+    other than four quads around. Reports of early commits do not name the corners; there the
+    singularities must be all of those off sharp edges, and among those inside.
     """
-    figures = figures_of(run)
-    inside = figures["irregular"]
-    off = figures.get("irregular_off_creases", inside)
+    inside = figures_of(run)["irregular"]
     field: dict[str, int] = {}
     for part in run["parts"]:
-        for quads, count in part["singularities"].items():
-            field[quads] = field.get(quads, 0) + count
+        for kind in ("singularities", "crease_corners"):
+            for quads, count in part.get(kind, {}).items():
+                field[quads] = field.get(quads, 0) + count
+    named = all("crease_corners" in part for part in run["parts"])
+    off = inside if named else figures_of(run).get("irregular_off_creases", inside)
     return float(
         sum(
             max(off.get(v, 0) - field.get(v, 0), field.get(v, 0) - inside.get(v, 0), 0)

@@ -83,10 +83,8 @@ def one(tool: str, mesh: Path, target: int, limit: int, folder: Path) -> Result:
         return result
     if report.exists():
         values = json.loads(report.read_text())
-        result["parts"] = [
-            {k: part[k] for k in ("method", "reason", "singularities", "cancelled", "target")}
-            for part in values["components"]
-        ]
+        kept = ("method", "reason", "singularities", "crease_corners", "cancelled", "target")
+        result["parts"] = [{k: part[k] for k in kept} for part in values["components"]]
         result["seconds"] = {k: round(v, 2) for k, v in values["seconds"].items()}
     verdict = folder / "verdict"
     words = [sys.executable, str(HERE / "judge.py"), str(out), str(mesh)]

@@ -129,6 +129,20 @@ def run(**changes: Any) -> dict[str, Any]:
     }
 
 
+def test_irregular_vertices_must_be_those_of_the_field_each_valence_by_itself() -> None:
+    sound = run(irregular={"3": 10, "5": 2}, irregular_off_creases={"3": 8})
+    sound["parts"][0]["crease_corners"] = {"3": 2, "5": 2}
+    assert bars.extra_irregular(sound) == 0
+    for corners, extra in (({"3": 2}, 2), ({"3": 3, "5": 2}, 1), ({"3": 2, "5": 1, "6": 1}, 2)):
+        sound["parts"][0]["crease_corners"] = corners
+        assert bars.extra_irregular(sound) == extra
+    # A report that does not name corners is held to what is off sharp edges.
+    del sound["parts"][0]["crease_corners"]
+    assert bars.extra_irregular(sound) == 0
+    sound["figures"]["irregular_off_creases"] = {"3": 9, "5": 1}
+    assert bars.extra_irregular(sound) == 2
+
+
 def test_bars_hold_for_a_sound_run() -> None:
     assert all(bar.held(run()) for bar in bars.BARS if bar.applies(run()))
     assert not remesh_folder.missed(run())

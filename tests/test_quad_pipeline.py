@@ -150,6 +150,16 @@ def test_irregular_vertices_are_the_singularities_of_the_field() -> None:
             assert sum((4 - k) * n for k, n in irregular.items()) == 4 * mesh.euler_characteristic
 
 
+def test_corners_of_creases_are_irregular_as_the_field_says() -> None:
+    """Three quads at a corner of a block, five at a corner of a hole: a face around, two in it."""
+    for mesh, corners in ((cube(), {3: 8}), (plate_with_holes(2), {3: 8, 5: 16})):
+        result = run(mesh, 400)
+        part = result.report.components[0]
+        assert part.method == MAP
+        assert (dict(part.singularities), dict(part.crease_corners)) == ({}, corners)
+        assert result.quads.irregular_interior == corners
+
+
 @given(
     strength=st.floats(0.2, 1.0),
     target=st.integers(50, 300),

@@ -84,6 +84,9 @@ class ComponentReport:
     seconds : dict of str to float
         Wall time of each step.
     warnings : tuple of str
+    crease_corners : dict of int to int
+        Inner vertices on creases where the field has other than four quads around, by their number.
+        These and the singularities are the irregular vertices inside.
     """
 
     vertices: int
@@ -96,6 +99,7 @@ class ComponentReport:
     cancelled: int = 0
     seconds: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    crease_corners: Mapping[int, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -87,6 +87,8 @@ class AlignReport:
         Quarter indices moved away from vertices that had too few quads.
     singularities : dict of int to int
         Interior singular vertices by number of quads around them (4 less 4 times the index).
+    crease_corners : dict of int to int
+        Inner vertices on creases by number of quads around them, where that is not 4.
     """
 
     edge_length: float
@@ -98,6 +100,7 @@ class AlignReport:
     absorbed: int = 0
     indices_moved: int = 0
     singularities: dict[int, int] = default(default_factory=dict)
+    crease_corners: dict[int, int] = default(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,6 +223,7 @@ def align_field(
         absorbed=absorbed,
         indices_moved=moved,
         singularities=_singularities(matched),
+        crease_corners=_crease_corners(matched),
     )
     return _pack(matched, first.then(room).then(last), field, report)
 
@@ -276,6 +280,16 @@ def _cure(
 def _singularities(matched: MatchedField) -> dict[int, int]:
     plain = ~matched.sector_is_feature & matched.sector_is_singular
     return dict(sorted(Counter(matched.sector_quads[plain].tolist()).items()))
+
+
+def _crease_corners(matched: MatchedField) -> dict[int, int]:
+    vertex, n = matched.sector_vertex, matched.mesh.n_vertices
+    quads = np.zeros(n, dtype=np.int64)
+    np.add.at(quads, vertex, matched.sector_quads)
+    on = np.zeros(n, dtype=bool)
+    on[vertex[matched.sector_is_feature]] = True
+    irregular = on & ~matched.mesh.is_boundary_vertex & (quads != 4)
+    return dict(sorted(Counter(quads[irregular].tolist()).items()))
 
 
 def _pack(

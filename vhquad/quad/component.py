@@ -10,14 +10,14 @@ paired (:mod:`vhquad.quad.fallback`).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vhquad.errors import FieldError, ParametrizationError
-from vhquad.field.align import AlignedField, AlignSettings, align_field
+from vhquad.field.align import AlignedField, AlignReport, AlignSettings, align_field
 from vhquad.field.creases import TOGETHER, creases_for_quads
 from vhquad.field.cross import CrossField
 from vhquad.mesh.closest import ClosestPoints
@@ -102,6 +102,19 @@ _ATTEMPTS = (
 )
 
 
+def _attempts(
+    mesh: TriMesh, given: Ints | None, angle: float | None, length: float
+) -> Iterator[tuple[_Attempt, Ints]]:
+    """What to try in turn, with the creases kept; nothing twice where there are none to give up."""
+    tried: set[tuple[float, bytes]] = set()
+    for attempt in _ATTEMPTS:
+        creases = attempt.creases(mesh, given, angle, length)
+        key = (attempt.smoothing, creases.tobytes())
+        if key not in tried:
+            tried.add(key)
+            yield attempt, creases
+
+
 def remesh_component(
     mesh: TriMesh,
     field: CrossField,
@@ -125,8 +138,7 @@ def remesh_component(
     reasons: list[str] = []
     rough: list[tuple[float, _Mapped, str]] = []  # of another count than asked for
     done: list[tuple[int, _Mapped, QuadMesh, str]] = []
-    for attempt in _ATTEMPTS:
-        creases = attempt.creases(mesh, given, angle, length)
+    for attempt, creases in _attempts(mesh, given, angle, length):
         try:
             mapped = _by_map(mesh, field, creases, seam, target, size_weight, attempt, watch, tell)
         except (ParametrizationError, FieldError) as problem:
@@ -151,14 +163,13 @@ def remesh_component(
     if done:
         _, mapped, quads, method = min(done, key=lambda found: found[0])
         aligning = mapped.aligned.report
-        singularities, cancelled = aligning.singularities, aligning.pairs_cancelled
         if with_uv:
             with watch("integer-grid map"):
                 uv = mapped.uv()
     else:
         with watch("fallback"):
             quads = triangles_to_quads(mesh, target, angle=field.angle)
-        method, singularities, cancelled = PAIRED, {}, 0
+        method, aligning = PAIRED, AlignReport(length)
     tell("done", 1.0)
     report = ComponentReport(
         vertices=mesh.n_vertices,
@@ -167,8 +178,9 @@ def remesh_component(
         made=quads.n_quads,
         method=method,
         reason="" if method == MAP else "; ".join(dict.fromkeys(reasons)),
-        singularities=singularities,
-        cancelled=cancelled,
+        singularities=aligning.singularities,
+        crease_corners=aligning.crease_corners,
+        cancelled=aligning.pairs_cancelled,
         seconds=dict(watch.seconds),
     )
     return Part(quads, report, uv)
