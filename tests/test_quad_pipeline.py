@@ -35,7 +35,7 @@ from vhquad.field.transport import to_vertices
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.quality import scaled_jacobians
 from vhquad.mesh.triangle import TriMesh
-from vhquad.quad.component import MAP
+from vhquad.quad.component import MAP, PAIRED
 from vhquad.quad.pipeline import RemeshResult, RemeshSettings, remesh_mesh
 from vhquad.quad.quantize import Quantisation, quantise
 from vhquad.quad.tmesh import TMesh
@@ -350,3 +350,14 @@ def test_what_does_not_fit_is_refused() -> None:
     ):
         with pytest.raises(ConfigError, match="--"):
             RemeshSettings(**wrong)  # type: ignore[arg-type]
+
+
+def test_many_singularities_give_way_to_the_count() -> None:
+    """A field of noise has a hundred singularities; each pair kept apart would cost quads."""
+    mesh = icosphere(3)
+    rough = CrossField("faces", noisy(mesh, 0.9, np.random.default_rng(0)))
+    result = run(mesh, 60, rough)
+    part = result.report.components[0]
+    assert abs(part.made / 60 - 1) <= 0.1
+    assert part.method != PAIRED
+    check_valid(mesh, result)

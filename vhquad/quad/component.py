@@ -72,12 +72,15 @@ class _Mapped:
 class _Attempt:
     """One way to try; lengths are in wanted quad edges.
 
-    ``smoothing``: detail of the field below this is smoothed away. ``crease_length``: creases must
-    hang together over this length; None: no creases.
+    ``smoothing``: detail of the field below this is smoothed away. ``cancel``: opposite
+    singularities closer than this are cancelled; where those of fingers and folds must all stay
+    apart, that takes more quads than were asked for. ``crease_length``: creases must hang together
+    over this length; None: no creases.
     """
 
     name: str
     smoothing: float
+    cancel: float
     crease_length: float | None
 
     def creases(
@@ -95,10 +98,10 @@ class _Attempt:
 
 MAP, PAIRED = "integer-grid map", "paired triangles"
 _ATTEMPTS = (
-    _Attempt(MAP, 0.5, TOGETHER),
-    _Attempt(f"{MAP}, smoother field", 1.5, 8.0),
-    _Attempt(f"{MAP}, no creases", 1.5, None),
-    _Attempt(f"{MAP}, no creases, smoothest field", 5.0, None),
+    _Attempt(MAP, 0.5, 0.5, TOGETHER),
+    _Attempt(f"{MAP}, smoother field", 1.5, 1.0, 8.0),
+    _Attempt(f"{MAP}, no creases", 1.5, 1.0, None),
+    _Attempt(f"{MAP}, no creases, smoothest field", 5.0, 2.0, None),
 )
 
 
@@ -207,7 +210,7 @@ def _by_map(
     tell("align the field", 0.0)
     length = float(np.sqrt(mesh.area / target))
     with watch("align"):
-        settings = AlignSettings(edge_length=length, smoothing=attempt.smoothing)
+        settings = AlignSettings(length, attempt.smoothing, attempt.cancel)
         aligned = align_field(mesh, field, creases, settings, seam)
     tell("map", 0.15)
     with watch("map"):
