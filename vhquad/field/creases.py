@@ -1,4 +1,4 @@
-"""Creases that quads of a size can follow: found by angle, joined across gaps, no loose ends."""
+"""Creases that quads of a size can follow: found by angle, grown and joined, no loose ends."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from vhquad.field.bridge import bridge_gaps
 from vhquad.field.features import find_creases
+from vhquad.field.grow import grow_creases
 from vhquad.field.prune import prune_branches
 from vhquad.mesh.triangle import TriMesh
 
@@ -41,5 +42,6 @@ def creases_for_quads(
         Vertex pairs.
     """
     found = find_creases(mesh, degrees, together * edge_length)
-    joined = bridge_gaps(mesh, found, GAP * edge_length)
+    grown = grow_creases(mesh, found, degrees)
+    joined = bridge_gaps(mesh, grown, GAP * edge_length)
     return prune_branches(mesh, joined, LOOSE * edge_length)

@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 
 from vhquad.errors import ConfigError, MeshError
 from vhquad.field.matching import MatchedField
-from vhquad.field.sharpness import is_sudden
+from vhquad.field.sharpness import LEAST_AROUND, is_sudden
 from vhquad.geometry import curvature
 from vhquad.mesh.triangle import TriMesh, next_halfedge
 
@@ -64,7 +64,7 @@ def find_creases(mesh: TriMesh, degrees: float = 40.0, shortest: float = 0.0) ->
     """
     angles = dihedral_angles(mesh)
     edges = _above(angles, degrees)
-    edges = edges[is_sudden(mesh, edges, angles[edges], 0.85 * np.radians(degrees))]
+    edges = edges[is_sudden(mesh, edges, angles[edges], LEAST_AROUND * np.radians(degrees))]
     return drop_short_creases(mesh, mesh.edges[edges], shortest)
 
 

@@ -17,13 +17,15 @@ from scipy.spatial import cKDTree
 
 from vhquad.mesh.triangle import TriMesh
 
-__all__ = ["chain_labels", "is_sudden", "side_angles"]
+__all__ = ["LEAST_AROUND", "chain_labels", "is_sudden", "side_angles"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 REACH = 1.5  # of the neighbourhood, in mean lengths of the edges around
+LEAST_AROUND = 0.85
+"""Of the angle that a sharp edge has at least: by so much its two sides must differ."""
 SHARE = (0.85, 1.2)  # of the bend that the edge itself may take on a crease
 
 

@@ -1,0 +1,64 @@
+"""grow_creases: what belongs to a crease comes back, noise and round folds stay out."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tests.meshes import cube, icosphere
+from tests.test_field_sharpness import folded
+from vhquad.field.features import find_creases, sharp_edges
+from vhquad.field.grow import grow_creases
+from vhquad.field.sharpness import side_angles
+from vhquad.mesh.triangle import TriMesh
+
+
+def edges_of(pairs: np.ndarray) -> set[tuple[int, int]]:
+    return {(int(min(p)), int(max(p))) for p in pairs}
+
+
+def test_the_rest_of_a_crease_comes_back() -> None:
+    mesh = cube(6)
+    creases = find_creases(mesh, 40.0)
+    some = creases[:5]
+    grown = grow_creases(mesh, some, 40.0)
+    np.testing.assert_array_equal(grown[:5], some)
+    assert edges_of(grown) == edges_of(creases)
+    assert len(grown) == len(creases)
+
+
+def test_a_crease_that_turns_into_a_chamfer_goes_on() -> None:
+    """Two steps of 50 degrees, a column apart: each takes half of the bend and is no crease.
+
+    Where a crease goes over into one of them, that one is kept, over its whole length.
+    """
+    mesh = folded(2, np.radians(100), n=24)
+    sharp = sharp_edges(mesh, 40.0)
+    assert len(find_creases(mesh, 40.0)) == 0
+    assert (side_angles(mesh, sharp) > np.radians(60)).all()
+    pairs = mesh.edges[sharp]
+    column = np.rint(mesh.vertices[pairs[:, 0], 0] * 1e6)
+    one = pairs[column == column[0]]
+    assert edges_of(grow_creases(mesh, one[:2], 40.0)) == edges_of(one)
+
+
+def test_a_round_fold_does_not_join() -> None:
+    """Of three steps of 50 degrees, the middle one sees all three bend the surface."""
+    mesh = folded(3, np.radians(150), n=24)
+    sharp = sharp_edges(mesh, 40.0)
+    inner = np.argsort(side_angles(mesh, sharp))[-8:]
+    first = mesh.edges[sharp[inner[:1]]]
+    assert len(grow_creases(mesh, first, 40.0)) == 1
+
+
+def test_noise_does_not_join() -> None:
+    sphere = icosphere(4)
+    rng = np.random.default_rng(0)
+    noisy = TriMesh(sphere.vertices * (1 + 0.03 * rng.normal(size=(2562, 1))), sphere.faces)
+    sharp = sharp_edges(noisy, 40.0)
+    few = noisy.edges[sharp[::100]]
+    assert len(sharp) > 1000
+    assert len(grow_creases(noisy, few, 40.0)) < len(few) + 0.05 * len(sharp)
+
+
+def test_nothing_grows_from_nothing() -> None:
+    assert grow_creases(cube(3), np.zeros((0, 2), np.int64), 40.0).shape == (0, 2)

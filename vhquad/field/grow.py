@@ -1,0 +1,59 @@
+"""Growth of creases along sharp edges that alone would not count as creases.
+
+A remesher that cuts a crease's corners leaves edges on it that bend more or less than the surface
+around them, and :mod:`vhquad.field.sharpness` takes no chain of such edges for a crease. Where they
+touch a crease, and the surface bends by as much all around, they belong to it (the hysteresis of
+Canny 1986). A round fold, whose bend many edges share, does not.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from vhquad.field.features import dihedral_angles, sharp_edges
+from vhquad.field.sharpness import LEAST_AROUND, side_angles
+from vhquad.mesh.triangle import TriMesh
+
+__all__ = ["grow_creases"]
+
+Ints = NDArray[np.int64]
+
+SHARE = 0.55  # least one of the bend around that an edge takes: two may share it, not three
+
+
+def grow_creases(mesh: TriMesh, pairs: Ints, degrees: float) -> Ints:
+    """Crease edges with the sharp edges that hang together with them.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+    pairs : (k, 2) int64
+        Crease edges as vertex pairs.
+    degrees : float
+        Least angle between the normals of the two faces of an edge; the sides around it must differ
+        nearly as much.
+
+    Returns
+    -------
+    (j, 2) int64
+        The same pairs, with others behind them.
+    """
+    pairs = np.asarray(pairs, dtype=np.int64).reshape(-1, 2)
+    sharp = sharp_edges(mesh, degrees)
+    if len(pairs) == 0 or len(sharp) == 0:
+        return pairs
+    around = side_angles(mesh, sharp)
+    bends = (around > LEAST_AROUND * np.radians(degrees)) & (
+        dihedral_angles(mesh)[sharp] > SHARE * around
+    )
+    n = np.int64(mesh.n_vertices)
+    known = pairs.min(axis=1) * n + pairs.max(axis=1)
+    others = mesh.edges[sharp[bends]]
+    others = others[~np.isin(others[:, 0] * n + others[:, 1], known)]
+    everything = np.concatenate([pairs, others])
+    graph = coo_matrix((np.ones(len(everything), dtype=np.int8), everything.T), (n, n))
+    piece = connected_components(graph, directed=False)[1]
+    return np.concatenate([pairs, others[np.isin(piece[others[:, 0]], piece[pairs])]])
