@@ -2,8 +2,9 @@
 
 Vertices descend a barrier energy that unfolds (:mod:`vhquad.quad.descent`); after each step they
 return to the surface or slide on their curve (:mod:`vhquad.quad.sliding`). Quads still poor get
-patch problems of their own; where some stay folded, vertices spread first in another attempt. The
-best state met is returned: never more folded quads than came in.
+patch problems of their own; where some stay folded, vertices spread first in another attempt. At
+last those on curves go where edges keep nearest to the curves (:mod:`vhquad.quad.settle`). The best
+state met is returned: never more folded quads than came in.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.descent import better, descend, laplacian_factor, spread
 from vhquad.quad.distortion import corner_jacobians, cross
 from vhquad.quad.guide import FieldGuide
+from vhquad.quad.settle import settle_on_curves
 from vhquad.quad.sliding import Problem, State, make_problem, measure, place
 
 __all__ = ["smooth_quads", "smoothed_sizes"]
@@ -112,7 +114,8 @@ def smooth_quads(
         other = spread(problem, start, factor, SPREAD_ITERATIONS)
         other = _mended(problem, descend(problem, other, factor, iterations, PATIENCE), POOR)
         state = other if better(other, state) else state
-    return (start if better(start, state) else state).vertices
+    state = start if better(start, state) else state
+    return settle_on_curves(problem, state, POOR).vertices
 
 
 def smoothed_sizes(vertices: Floats, quads: Ints, area: float, rounds: int = 8) -> Floats:
