@@ -82,7 +82,7 @@ class Polyline:
         -------
         (..., i, j) float64
         """
-        xa, fa, sa = (self._spread(values, a.ndim) for values in self.at(a))
+        xa, fa, sa = (np.expand_dims(values, a.ndim) for values in self.at(a))
         xb, fb, sb = (np.expand_dims(values, a.ndim - 1) for values in self.at(b))
         length = (b[..., None, :] - a[..., :, None])[..., None]
         chord = xb - xa
@@ -94,10 +94,6 @@ class Polyline:
         along, start = np.einsum("...i,...ij,...j->...", d, second, d), (d * xa).sum(axis=-1)
         along += start**2 * length[..., 0] - 2 * start * (d * first).sum(axis=-1)
         return np.asarray(np.sqrt(np.maximum(whole - along, 0.0) * length[..., 0]))
-
-    @staticmethod
-    def _spread(values: Floats, axis: int) -> Floats:
-        return np.expand_dims(values, axis)
 
     def places(self, s: Floats, low: Floats, high: Floats) -> Floats:
         """Places for vertices at s between low and high, on kinks where one is near; (q, k)."""

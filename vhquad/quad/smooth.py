@@ -39,6 +39,7 @@ POOR_ROUNDS = 2
 POOR_RINGS = 4
 PATCH_ITERATIONS = 40
 PATIENCE = 60
+SETTLED = 0.3  # scaled Jacobian that nearness to a curve must leave a quad
 
 
 def smooth_quads(
@@ -115,7 +116,7 @@ def smooth_quads(
         other = _mended(problem, descend(problem, other, factor, iterations, PATIENCE), POOR)
         state = other if better(other, state) else state
     state = start if better(start, state) else state
-    return settle_on_curves(problem, state, POOR).vertices
+    return settle_on_curves(problem, state, SETTLED).vertices
 
 
 def smoothed_sizes(vertices: Floats, quads: Ints, area: float, rounds: int = 8) -> Floats:
