@@ -3,7 +3,8 @@
 A remesher that cuts a crease's corners leaves edges on it that bend more or less than the surface
 around them, and :mod:`vhquad.field.sharpness` takes no chain of such edges for a crease. Where they
 touch a crease, and the surface bends by as much all around, they belong to it (the hysteresis of
-Canny 1986). A round fold, whose bend many edges share, does not.
+Canny 1986). A round fold, whose bend many edges share, does not. Where most sharp edges are no
+creases, as on a wrinkled skin, nothing grows: there the doubtful ones would cost squareness.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ __all__ = ["grow_creases"]
 Ints = NDArray[np.int64]
 
 SHARE = 0.55  # least one of the bend around that an edge takes: two may share it, not three
+MOSTLY = 0.7  # least share of creases in the length of all sharp edges
 
 
 def grow_creases(mesh: TriMesh, pairs: Ints, degrees: float) -> Ints:
@@ -45,6 +47,8 @@ def grow_creases(mesh: TriMesh, pairs: Ints, degrees: float) -> Ints:
     sharp = sharp_edges(mesh, degrees)
     if len(pairs) == 0 or len(sharp) == 0:
         return pairs
+    if _length(mesh, pairs) < MOSTLY * _length(mesh, mesh.edges[sharp]):
+        return pairs
     around = side_angles(mesh, sharp)
     bends = (around > LEAST_AROUND * np.radians(degrees)) & (
         dihedral_angles(mesh)[sharp] > SHARE * around
@@ -57,3 +61,7 @@ def grow_creases(mesh: TriMesh, pairs: Ints, degrees: float) -> Ints:
     graph = coo_matrix((np.ones(len(everything), dtype=np.int8), everything.T), (n, n))
     piece = connected_components(graph, directed=False)[1]
     return np.concatenate([pairs, others[np.isin(piece[others[:, 0]], piece[pairs])]])
+
+
+def _length(mesh: TriMesh, pairs: Ints) -> float:
+    return float(np.linalg.norm(np.diff(mesh.vertices[pairs], axis=1), axis=2).sum())

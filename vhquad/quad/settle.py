@@ -25,7 +25,8 @@ Bools = NDArray[np.bool_]
 
 ROUNDS = 5  # while some quads come out worse
 ITERATIONS = 15  # of the vertices that follow
-RINGS = 2  # of quads around a bad one, whose vertices stay
+RINGS = 2  # of quads around a bad one, whose vertices stay; around a moved vertex, that follow
+MOVED = 0.02  # of the wanted edge length: a move that others follow
 
 
 def settle_on_curves(problem: Problem, state: State, least: float) -> State:
@@ -70,7 +71,10 @@ def _followed(problem: Problem, state: State, arc: Floats, held: Bools) -> State
     # The others keep what they know of the sheet of the surface that they are on.
     face, normals = state.face.copy(), state.normals.copy()
     face[line], normals[line] = there.face[line], there.normals[line]
-    still = held.copy()
+    moved = np.linalg.norm(x - state.vertices, axis=1) > MOVED * problem.reach
+    near = np.zeros(len(x), dtype=bool)
+    near[problem.quads[within_rings(problem.quads, moved[problem.quads].any(axis=1), RINGS)]] = True
+    still = held | ~near
     still[line] = True
     part = replace(problem, fixed=still, on_curve=line[:0])
     found = measure(part, x, arc, normals, face)
