@@ -98,7 +98,7 @@ def test_creases_survive_weld_and_split(tmp_path: Path) -> None:
         ("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", r"mesh\.obj: none of the 1 faces has any area"),
         ("v 0 0 0\nv 1 0 0\nf 1 2\n", r"mesh\.obj: there are no faces"),
         ("v 0 0 0\nf 1 2 3\n", r"mesh\.obj: line 2 names vertex 2"),
-        ("hello\n", r"mesh\.obj has 0 vertices but no faces"),
+        ("hello\n", r"mesh\.obj holds neither vertices nor faces"),
     ],
 )
 def test_errors_name_the_file_in_one_line(tmp_path: Path, text: str, say: str) -> None:

@@ -81,10 +81,12 @@ def read_polygons(path: PathLike) -> PolygonSoup:
         raise MeshError(f"{file}: {error}; check or re-export the file") from None
     if soup.n_faces == 0:
         count = len(soup.vertices)
+        if not count:
+            raise MeshError(
+                f"{file} holds neither vertices nor faces; is it a mesh, and whole? Export it again"
+            )
         raise MeshError(
-            f"{file} has {count} vertices but no faces"
-            + (" (a point cloud?)" if count else "")
-            + "; export it as a surface mesh"
+            f"{file} has {count} vertices but no faces (a point cloud?); export it as a surface mesh"
         )
     return PolygonSoup(soup.vertices, soup.corners, soup.sizes, soup.lines, file.stem)
 
