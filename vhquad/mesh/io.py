@@ -86,7 +86,7 @@ def read_polygons(path: PathLike) -> PolygonSoup:
                 f"{file} holds neither vertices nor faces; is it a mesh, and whole? Export it again"
             )
         raise MeshError(
-            f"{file} has {count} vertices but no faces (a point cloud?); export it as a surface mesh"
+            f"{file} has {count} vertices but no faces (a point cloud?); export a surface"
         )
     return PolygonSoup(soup.vertices, soup.corners, soup.sizes, soup.lines, file.stem)
 
