@@ -17,14 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import fmin_l_bfgs_b
 from scipy.sparse import coo_matrix, diags_array
-from scipy.sparse.csgraph import connected_components
 
 from vhquad.geometry.sparse import PositiveFactor
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.facing import FacingPoints
 from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.quality import flipped_quads, scaled_jacobians
-from vhquad.mesh.rings import within_rings
+from vhquad.mesh.rings import separate_parts, within_rings
 from vhquad.quad.distortion import barrier_width, distortion, quad_normals, unit
 
 __all__ = ["lifted", "rim_vertices", "wrong_quads"]
@@ -99,20 +98,10 @@ def _without_wrong(x: Floats, quads: Ints, surface: ClosestPoints, held: Bools) 
     for pull, rings in TRIES:
         if not wrong.any():
             break
-        for inside in _components(quads, within_rings(quads, wrong, rings)):  # few
+        for inside in separate_parts(quads, within_rings(quads, wrong, rings)):  # few
             x = _relaid(x, quads, inside, surface, held, pull)
         wrong = wrong_quads(x, quads, surface)
     return x
-
-
-def _components(quads: Ints, inside: Bools) -> list[Ints]:
-    """Some quads in parts that share no vertex."""
-    which = np.flatnonzero(inside)
-    rows = np.repeat(np.arange(len(which)), 4)
-    shape = (len(which), int(quads.max(initial=-1)) + 1)
-    touching = coo_matrix((np.ones(len(rows)), (rows, quads[which].reshape(-1))), shape).tocsr()
-    number, label = connected_components(touching @ touching.T, directed=False)
-    return [which[label == i] for i in range(number)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,12 +13,10 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from vhquad.errors import MeshError
 from vhquad.mesh.closest import ClosestPoints
-from vhquad.mesh.rings import within_rings
+from vhquad.mesh.rings import separate_parts, within_rings
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.descent import better, descend, laplacian_factor, spread
 from vhquad.quad.distortion import corner_jacobians, cross
@@ -150,7 +148,8 @@ def _mended(problem: Problem, state: State, least: float) -> State:
     for rings, spreading in FOLDED_ROUNDS:
         if not state.folded.any():
             break
-        for patch in _components(problem, within_rings(problem.quads, state.folded, rings)):  # few
+        around = within_rings(problem.quads, state.folded, rings)
+        for patch in separate_parts(problem.quads, around):  # few
             state = _solve_patch(problem, state, patch, spreading, guided=False)
     if not state.folded.any():
         for _ in range(POOR_ROUNDS):
@@ -158,32 +157,18 @@ def _mended(problem: Problem, state: State, least: float) -> State:
             poor = jacobians.min(axis=1) < least
             if not poor.any():
                 break
-            state = _solve_patch(
-                problem, state, within_rings(problem.quads, poor, POOR_RINGS), 0, guided=True
-            )
+            patch = np.flatnonzero(within_rings(problem.quads, poor, POOR_RINGS))
+            state = _solve_patch(problem, state, patch, 0, guided=True)
     return state
 
 
-def _components(problem: Problem, inside: Bools) -> list[Bools]:
-    """Some quads in parts that share no vertex."""
-    quads = problem.quads[inside]
-    rows = np.repeat(np.arange(len(quads)), 4)
-    touching = coo_matrix(
-        (np.ones(len(rows), dtype=np.int32), (rows, quads.reshape(-1))),
-        shape=(len(quads), len(problem.fixed)),
-    ).tocsr()
-    number, label = connected_components(touching @ touching.T, directed=False)
-    where = np.flatnonzero(inside)
-    return [np.isin(np.arange(len(inside)), where[label == i]) for i in range(number)]
-
-
 def _solve_patch(
-    problem: Problem, state: State, inside: Bools, spreading: int, guided: bool
+    problem: Problem, state: State, inside: Ints, spreading: int, guided: bool
 ) -> State:
     """Minimise again over some quads only, their outer vertices held."""
     held = np.ones(len(problem.fixed), dtype=bool)
     held[problem.quads[inside]] = False
-    held[problem.quads[~inside]] = True
+    held[np.delete(problem.quads, inside, axis=0)] = True
     used, local = np.unique(problem.quads[inside], return_inverse=True)
     part = make_problem(
         local.reshape(-1, 4),
