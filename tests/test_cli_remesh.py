@@ -167,7 +167,7 @@ def test_map_for_libqex(invoke: Invoke, ring: Path) -> None:
     [
         ("empty.obj", b"", ["empty.obj", "is empty"]),
         ("blank.obj", b"\n\n", ["blank.obj", "is empty"]),
-        ("text.obj", b"this is no mesh\n", ["text.obj", "no faces"]),
+        ("text.obj", b"this is no mesh\n", ["text.obj", "nor faces"]),
         ("cloud.obj", b"v 0 0 0\nv 1 0 0\n", ["cloud.obj", "no faces"]),
         ("nan.obj", b"v 0 0 0\nv 1 0 0\nv nan 1 0\nf 1 2 3\n", ["nan.obj", "NaN"]),
         ("far.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", ["far.obj"]),
