@@ -186,6 +186,32 @@ def punctured_torus() -> TriMesh:
     return mesh.submesh((mesh.faces != 5).all(axis=1))[0]
 
 
+def ball_with_limb(length: float = 3.0, radius: float = 0.06, nu: int = 24) -> TriMesh:
+    """Unit ball with a thin limb along +z, pointed at its end: a surface of revolution."""
+    first = np.arcsin(radius)
+    angle = np.linspace(np.pi, 0.0, 25)[1:-1]  # from the south pole, as far as the limb
+    angle = angle[angle > first]
+    along = np.cos(first) + np.linspace(0.0, length, 37)
+    r = np.concatenate([np.sin(angle), np.full(len(along), radius)])
+    z = np.concatenate([np.cos(angle), along])
+    turn = _turn(nu)
+    rings = np.stack(
+        [np.outer(np.cos(turn), r), np.outer(np.sin(turn), r), np.tile(z, (nu, 1))], axis=-1
+    )
+    south, north = nu * len(r), nu * len(r) + 1
+    a = np.arange(nu) * len(r)
+    b = np.roll(a, -1)
+    lid, tip = np.full(nu, south), np.full(nu, north)
+    last = len(r) - 1
+    faces = [
+        _lattice(nu, len(r), wrap_u=True),
+        np.stack([b, a, lid], axis=1),
+        np.stack([a + last, b + last, tip], axis=1),
+    ]
+    poles = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, z[-1] + radius]])
+    return TriMesh(np.vstack([rings.reshape(-1, 3), poles]), np.concatenate(faces))
+
+
 # ---- quads ----------------------------------------------------------------------------------
 
 

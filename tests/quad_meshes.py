@@ -37,6 +37,14 @@ def quad_torus(nu: int = 36, nv: int = 14, major: float = 1.0, minor: float = 0.
     return p.reshape(-1, 3), _cells(nu, nv, True, True)
 
 
+def quad_tube(nu: int = 12, nv: int = 8) -> Quads:
+    """Open tube of unit squares about z, facing outward."""
+    u, z = np.meshgrid(2 * np.pi * np.arange(nu) / nu, np.arange(nv + 1.0), indexing="ij")
+    radius = 0.5 / np.sin(np.pi / nu)
+    v = np.stack([radius * np.cos(u), radius * np.sin(u), z], axis=-1).reshape(-1, 3)
+    return v, _cells(nu, nv + 1, True, False)
+
+
 def cube_sphere(n: int = 8) -> Quads:
     """Unit sphere from a cube with n x n quads a side: 8 vertices of valence 3."""
     t = np.linspace(-1.0, 1.0, n + 1)

@@ -3,9 +3,9 @@
 The field is aligned (:mod:`vhquad.field.align`), turned into a seamless map
 (:mod:`vhquad.quad.seamless_map`), cut into rectangles (:mod:`vhquad.quad.tmesh`), quantised
 (:mod:`vhquad.quad.quantize`), laid on the surface (:mod:`vhquad.quad.embed`), polished
-(:mod:`vhquad.quad.smooth`) and freed of the last folds (:mod:`vhquad.quad.lift`). Where no valid
-map is found the field is smoothed further, then creases are given up, and at last triangles are
-paired (:mod:`vhquad.quad.fallback`).
+(:mod:`vhquad.quad.smooth`) without laying limbs bare (:mod:`vhquad.quad.limbs`) and freed of the
+last folds (:mod:`vhquad.quad.lift`). Where no valid map is found the field is smoothed further,
+then creases are given up, and at last triangles are paired (:mod:`vhquad.quad.fallback`).
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from vhquad.quad.guide import FieldGuide
 from vhquad.quad.integer_map import integer_map
 from vhquad.quad.layout import Layout
 from vhquad.quad.lift import lifted, wrong_quads
+from vhquad.quad.limbs import Covering, polished_onto_limbs
 from vhquad.quad.motorcycle import Tracing, trace
 from vhquad.quad.parts import Part, UvMap
 from vhquad.quad.quantize import quantise
@@ -238,14 +239,12 @@ def _polished(mapped: _Mapped, surface: ClosestPoints, watch: Watch, tell: Progr
     quads = mapped.quads
     with watch("polish"):
         fixed, curves = _constraints(mapped.layout)
-        moved = smooth_quads(
-            quads.vertices,
-            quads.quads,
-            surface,
-            fixed,
-            curves,
-            guide=FieldGuide(mapped.aligned),
-        )
+        guide = FieldGuide(mapped.aligned)
+
+        def polish(held: Bools) -> NDArray[np.float64]:
+            return smooth_quads(quads.vertices, quads.quads, surface, held, curves, guide=guide)
+
+        moved = polished_onto_limbs(Covering.of(quads, surface), fixed, polish)
     with watch("unfold"):
         moved = lifted(moved, quads.quads, surface, fixed | (curves.curve >= 0))
     return QuadMesh(moved, quads.quads)
