@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -69,7 +70,10 @@ def check_valid(mesh: TriMesh, result: RemeshResult) -> None:
     assert len(report.components) == mesh.n_components
     assert report.quality is not None
     assert report.quality.boundary_loops == quads.n_boundary_loops
-    assert all((part.reason == "") == (part.method == MAP) for part in report.components)
+    for part in report.components:
+        off = abs(part.made / part.target - 1)
+        assert off <= 0.1 or part.reason or abs(part.made - part.target) <= 0.005 * report.asked
+        assert part.reason if part.is_fallback else not part.reason or off > 0.09
 
 
 def rim_distance(mesh: TriMesh, result: RemeshResult) -> float:
@@ -317,6 +321,24 @@ def test_a_field_without_a_map_falls_back(monkeypatch: pytest.MonkeyPatch) -> No
         assert part.method == "paired triangles"
         assert "3 triangles of the map stay folded after 9 solves" in part.reason
     assert any("paired triangles" in line for line in result.report.shortfalls())
+
+
+def test_a_count_that_nothing_meets_is_explained(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Attempts with twice the count, then three times ...: the first map is taken, as is said."""
+    factors = itertools.count(2)
+
+    def more(tmesh: TMesh, target: float, area: float) -> Quantisation:
+        return quantise(tmesh, next(factors) * target, area)
+
+    monkeypatch.setattr(component, "quantise", more)
+    mesh = tetrahedron()
+    result = run(mesh, 60)
+    check_valid(mesh, result)
+    assert next(factors) > 3
+    part = result.report.components[0]
+    assert part.method == MAP
+    assert part.reason.startswith(f"{part.made} quads where 60 were asked for; ")
+    assert any("count missed, because" in line for line in result.report.shortfalls())
 
 
 def test_a_layout_of_another_topology_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

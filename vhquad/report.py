@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from vhquad.mesh.triangle import TriMesh
 
 __all__ = [
+    "MAP",
     "CheckReport",
     "ComponentReport",
     "FieldReport",
@@ -27,6 +28,8 @@ __all__ = [
     "versions",
 ]
 
+MAP = "integer-grid map"
+"""The method of a component that needed no fallback."""
 COUNT_BAND = 0.10  # of the count asked for; a result farther off is a shortfall
 
 
@@ -75,7 +78,7 @@ class ComponentReport:
     method : str
         "integer-grid map", or the name of the fallback that was used.
     reason : str
-        Why a fallback was used; empty if none was.
+        Why a fallback was used, or why the count was missed without one; empty if neither was.
     singularities : dict of int to int
         Interior singular vertices of the field, by the number of quads around them (3 where the
         index is +1/4, 5 where it is -1/4).
@@ -100,6 +103,11 @@ class ComponentReport:
     seconds: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     crease_corners: Mapping[int, int] = field(default_factory=dict)
+
+    @property
+    def is_fallback(self) -> bool:
+        """Whether another way than the integer-grid map of the field as it was made the quads."""
+        return self.method != MAP
 
 
 @dataclass(frozen=True)
@@ -192,7 +200,7 @@ class RemeshReport:
     @property
     def fallbacks(self) -> tuple[ComponentReport, ...]:
         """The components that needed another way than the integer-grid map."""
-        return tuple(part for part in self.components if part.reason)
+        return tuple(part for part in self.components if part.is_fallback)
 
     @property
     def topology_kept(self) -> bool:
@@ -220,7 +228,8 @@ class RemeshReport:
         for number, part in enumerate(self.components):
             if part.reason:
                 where = f"component {number}: " if len(self.components) > 1 else ""
-                lines.append(f"{where}fallback used ({part.method}), because {part.reason}")
+                used = f"fallback used ({part.method})" if part.is_fallback else "count missed"
+                lines.append(f"{where}{used}, because {part.reason}")
         return tuple(lines)
 
     def to_dict(self) -> dict[str, Any]:

@@ -99,7 +99,7 @@ def _remesh_table(report: RemeshReport, target: str | None) -> Table:
     for method in dict.fromkeys(methods):
         share = f"  ({methods.count(method)} components)" if len(methods) > 1 else ""
         table.add_row("made by", f"{method}{share}")
-    for reason in dict.fromkeys(part.reason for part in report.fallbacks):
+    for reason in dict.fromkeys(part.reason for part in report.components if part.reason):
         table.add_row("  because", reason)
     _seconds_rows(table, report.seconds)
     return table

@@ -37,7 +37,7 @@ from vhquad.quad.quantize import quantise
 from vhquad.quad.seamless_map import SeamlessMap, solve_seamless_map
 from vhquad.quad.smooth import smooth_quads
 from vhquad.quad.tmesh import build_tmesh
-from vhquad.report import ComponentReport, MeshCounts
+from vhquad.report import MAP, ComponentReport, MeshCounts
 from vhquad.watch import Watch
 
 __all__ = ["MAP", "PAIRED", "Progress", "remesh_component"]
@@ -97,7 +97,7 @@ class _Attempt:
         return creases_for_quads(mesh, angle, length, self.crease_length)
 
 
-MAP, PAIRED = "integer-grid map", "paired triangles"
+PAIRED = "paired triangles"
 _ATTEMPTS = (
     _Attempt(MAP, 0.5, 0.5, TOGETHER),
     _Attempt(f"{MAP}, smoother field", 1.5, 1.0, 8.0),
@@ -160,7 +160,8 @@ def remesh_component(
         if wrong == 0 or len(done) == MOST_POLISHED:
             break
         reasons.append(f"{wrong} quads stay folded")
-    if rough and not done:
+    missed = bool(rough) and not done
+    if missed:
         _, mapped, name = min(rough, key=lambda found: found[0])
         done.append((0, mapped, _polished(mapped, surface, watch, tell), name))  # the only one
     uv: UvMap | None = None
@@ -181,7 +182,7 @@ def remesh_component(
         target=target,
         made=quads.n_quads,
         method=method,
-        reason="" if method == MAP else "; ".join(dict.fromkeys(reasons)),
+        reason="; ".join(dict.fromkeys(reasons)) if missed or method != MAP else "",
         singularities=aligning.singularities,
         crease_corners=aligning.crease_corners,
         cancelled=aligning.pairs_cancelled,
