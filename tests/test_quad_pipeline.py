@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -323,22 +322,33 @@ def test_a_field_without_a_map_falls_back(monkeypatch: pytest.MonkeyPatch) -> No
     assert any("paired triangles" in line for line in result.report.shortfalls())
 
 
-def test_a_count_that_nothing_meets_is_explained(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Attempts with twice the count, then three times ...: the first map is taken, as is said."""
-    factors = itertools.count(2)
+@pytest.mark.parametrize(
+    ("factors", "chosen"),
+    [((2, 3, 4, 5), 0), ((2.1, 2, 2, 2), 0), ((3, 2, 4, 4), 1), ((5, 4, 3, 2), 3)],
+)
+def test_a_count_that_nothing_meets_is_explained(
+    monkeypatch: pytest.MonkeyPatch, factors: tuple[float, ...], chosen: int
+) -> None:
+    """The first attempt that makes about the nearest count is taken, and the report says so."""
+    made: list[int] = []
 
     def more(tmesh: TMesh, target: float, area: float) -> Quantisation:
-        return quantise(tmesh, next(factors) * target, area)
+        found = quantise(tmesh, factors[len(made)] * target, area)
+        made.append(found.n_quads)
+        return found
 
     monkeypatch.setattr(component, "quantise", more)
     mesh = tetrahedron()
     result = run(mesh, 60)
     check_valid(mesh, result)
-    assert next(factors) > 3
+    assert len(made) == 4
     part = result.report.components[0]
-    assert part.method == MAP
-    assert part.reason.startswith(f"{part.made} quads where 60 were asked for; ")
-    assert any("count missed, because" in line for line in result.report.shortfalls())
+    assert part.made == made[chosen]
+    assert (part.method == MAP) == (chosen == 0)
+    for count in made:
+        assert f"{count} quads where 60 were asked for" in part.reason
+    lines = result.report.shortfalls()
+    assert any("count missed, because" in line for line in lines) == (chosen == 0)
 
 
 def test_a_layout_of_another_topology_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -60,6 +60,11 @@ class _Mapped:
     seamless: SeamlessMap
     tracing: Tracing
     layout: Layout
+    method: str
+
+    def miss(self, target: int) -> float:
+        """How far the count is off, as the logarithm of a factor."""
+        return float(abs(np.log(self.quads.n_quads / target)))
 
     def uv(self) -> UvMap:
         """The integer-grid map of the layout."""
@@ -135,13 +140,23 @@ def remesh_component(
     """Quads of one component by the first attempt that gives a valid mesh of about the count.
 
     Within ``slack`` quads any count is near enough. Where quads stay folded, another attempt may do
-    better.
+    better. If none meets the count, it is the first whose count is about the nearest.
     """
     watch = Watch()
     length = float(np.sqrt(mesh.area / target))
     reasons: list[str] = []
-    rough: list[tuple[float, _Mapped, str]] = []  # of another count than asked for
-    done: list[tuple[int, _Mapped, QuadMesh, str]] = []
+    rough: list[_Mapped] = []  # of another count than asked for
+    done: list[tuple[int, _Mapped, QuadMesh]] = []
+
+    def good_enough(mapped: _Mapped) -> bool:
+        """Polish an attempt; whether it is to be the last."""
+        quads = _polished(mapped, surface, watch, tell)
+        wrong = int(wrong_quads(quads.vertices, quads.quads, surface).sum())
+        done.append((wrong, mapped, quads))
+        if wrong > 0:
+            reasons.append(f"{wrong} quads stay folded")
+        return wrong == 0 or len(done) == MOST_POLISHED
+
     for attempt, creases in _attempts(mesh, given, angle, length):
         try:
             mapped = _by_map(mesh, field, creases, seam, target, size_weight, attempt, watch, tell)
@@ -149,25 +164,22 @@ def remesh_component(
             reasons.append(str(problem))
             continue
         made = mapped.quads.n_quads
-        miss = abs(np.log(made / target))
-        if miss > np.log(NEAR_COUNT) and abs(made - target) > slack:
-            rough.append((miss, mapped, attempt.name))
+        if mapped.miss(target) > np.log(NEAR_COUNT) and abs(made - target) > slack:
+            rough.append(mapped)
             reasons.append(f"{made} quads where {target} were asked for")
-            continue
-        quads = _polished(mapped, surface, watch, tell)
-        wrong = int(wrong_quads(quads.vertices, quads.quads, surface).sum())
-        done.append((wrong, mapped, quads, attempt.name))
-        if wrong == 0 or len(done) == MOST_POLISHED:
+        elif good_enough(mapped):
             break
-        reasons.append(f"{wrong} quads stay folded")
-    missed = bool(rough) and not done
-    if missed:
-        _, mapped, name = min(rough, key=lambda found: found[0])
-        done.append((0, mapped, _polished(mapped, surface, watch, tell), name))  # the only one
+    missed = not done
+    if missed and rough:
+        # The earlier an attempt, the more it keeps of the field and the creases.
+        least = min(mapped.miss(target) for mapped in rough)
+        for mapped in rough:
+            if mapped.miss(target) <= least + np.log(NEAR_COUNT) and good_enough(mapped):
+                break
     uv: UvMap | None = None
     if done:
-        _, mapped, quads, method = min(done, key=lambda found: found[0])
-        aligning = mapped.aligned.report
+        _, mapped, quads = min(done, key=lambda found: found[0])
+        method, aligning = mapped.method, mapped.aligned.report
         if with_uv:
             with watch("integer-grid map"):
                 uv = mapped.uv()
@@ -231,7 +243,7 @@ def _by_map(
         vertices = embed_layout(layout, aligned, seamless)
     quads = QuadMesh(vertices, layout.quads)
     _require_topology(quads, mesh)
-    return _Mapped(quads, aligned, seamless, tracing, layout)
+    return _Mapped(quads, aligned, seamless, tracing, layout, attempt.name)
 
 
 def _polished(mapped: _Mapped, surface: ClosestPoints, watch: Watch, tell: Progress) -> QuadMesh:
