@@ -18,7 +18,7 @@ from vhquad.field.features import dihedral_angles, sharp_edges
 from vhquad.field.sharpness import LEAST_AROUND, side_angles
 from vhquad.mesh.triangle import TriMesh
 
-__all__ = ["grow_creases"]
+__all__ = ["are_mostly_creases", "grow_creases"]
 
 Ints = NDArray[np.int64]
 
@@ -47,7 +47,7 @@ def grow_creases(mesh: TriMesh, pairs: Ints, degrees: float) -> Ints:
     sharp = sharp_edges(mesh, degrees)
     if len(pairs) == 0 or len(sharp) == 0:
         return pairs
-    if _length(mesh, pairs) < MOSTLY * _length(mesh, mesh.edges[sharp]):
+    if not are_mostly_creases(mesh, pairs, degrees):
         return pairs
     around = side_angles(mesh, sharp)
     bends = (around > LEAST_AROUND * np.radians(degrees)) & (
@@ -61,6 +61,11 @@ def grow_creases(mesh: TriMesh, pairs: Ints, degrees: float) -> Ints:
     graph = coo_matrix((np.ones(len(everything), dtype=np.int8), everything.T), (n, n))
     piece = connected_components(graph, directed=False)[1]
     return np.concatenate([pairs, others[np.isin(piece[others[:, 0]], piece[pairs])]])
+
+
+def are_mostly_creases(mesh: TriMesh, pairs: Ints, degrees: float) -> bool:
+    """Whether most of what is sharp on a mesh are creases: it was designed with them."""
+    return _length(mesh, pairs) >= MOSTLY * _length(mesh, mesh.edges[sharp_edges(mesh, degrees)])
 
 
 def _length(mesh: TriMesh, pairs: Ints) -> float:

@@ -20,6 +20,7 @@ from vhquad.errors import FieldError, ParametrizationError
 from vhquad.field.align import AlignedField, AlignReport, AlignSettings, align_field
 from vhquad.field.creases import TOGETHER, creases_for_quads
 from vhquad.field.cross import CrossField
+from vhquad.field.grow import are_mostly_creases
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.triangle import TriMesh
@@ -34,6 +35,7 @@ from vhquad.quad.limbs import Covering, polished_onto_limbs
 from vhquad.quad.motorcycle import Tracing, trace
 from vhquad.quad.parts import Part, UvMap
 from vhquad.quad.quantize import quantise
+from vhquad.quad.sag import sizes_for_creases
 from vhquad.quad.seamless_map import SeamlessMap, solve_seamless_map
 from vhquad.quad.smooth import smooth_quads
 from vhquad.quad.tmesh import build_tmesh
@@ -44,6 +46,7 @@ __all__ = ["MAP", "PAIRED", "Progress", "remesh_component"]
 
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
+Floats = NDArray[np.float64]
 
 NEAR_COUNT = 1.10  # a factor from the count asked for
 MOST_POLISHED = 2  # attempts, while quads stay folded
@@ -134,13 +137,16 @@ def remesh_component(
     slack: float,
     surface: ClosestPoints,
     size_weight: float,
+    adaptivity: float,
     with_uv: bool,
     tell: Progress,
 ) -> Part:
     """Quads of one component by the first attempt that gives a valid mesh of about the count.
 
-    Within ``slack`` quads any count is near enough. Where quads stay folded, another attempt may do
-    better. If none meets the count, it is the first whose count is about the nearest.
+    Within ``slack`` quads any count is near enough. ``adaptivity`` is how far sizes follow curved
+    creases: those that were given, or on a mesh where most of what is sharp are creases; on others
+    the doubtful ones would take the quads that shapes need. Where quads stay folded, another
+    attempt may do better. If none meets the count, it is the first whose count is about the nearest.
     """
     watch = Watch()
     length = float(np.sqrt(mesh.area / target))
@@ -158,8 +164,14 @@ def remesh_component(
         return wrong == 0 or len(done) == MOST_POLISHED
 
     for attempt, creases in _attempts(mesh, given, angle, length):
+        designed = given is not None or (
+            angle is not None and are_mostly_creases(mesh, creases, angle)
+        )
+        curved = adaptivity if designed else 0.0
         try:
-            mapped = _by_map(mesh, field, creases, seam, target, size_weight, attempt, watch, tell)
+            mapped = _by_map(
+                mesh, field, creases, seam, target, size_weight, curved, attempt, watch, tell
+            )
         except (ParametrizationError, FieldError) as problem:
             reasons.append(str(problem))
             continue
@@ -210,6 +222,7 @@ def _by_map(
     seam: Bools | None,
     target: int,
     size_weight: float,
+    curved: float,
     attempt: _Attempt,
     watch: Watch,
     tell: Progress,
@@ -228,7 +241,11 @@ def _by_map(
         aligned = align_field(mesh, field, creases, settings, seam)
     tell("map", 0.15)
     with watch("map"):
-        seamless = solve_seamless_map(aligned, size_weight=size_weight)
+        least: Floats | None = None
+        if curved > 0:
+            bent = sizes_for_creases(aligned, curved)
+            aligned, least = bent.aligned, bent.density
+        seamless = solve_seamless_map(aligned, size_weight=size_weight, least_density=least)
     if not seamless.is_valid:
         raise ParametrizationError(
             f"{seamless.flips} triangles of the map stay folded after {seamless.solves} solves"

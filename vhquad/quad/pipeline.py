@@ -201,7 +201,7 @@ def _remesh(
     ) -> list[Part]:
         onto = surface if half is mesh else ClosestPoints(half)
         return _remesh_parts(
-            half, own, creases, seam, settings.crease, onto, size_weight, with_uv, progress
+            half, own, creases, seam, settings, onto, size_weight, with_uv, progress
         )
 
     symmetry: SymmetryReport | None = None
@@ -224,7 +224,7 @@ def _remesh_parts(
     field: CrossField,
     given: Ints | None,
     seam: Bools | None,
-    angle: float | None,
+    settings: RemeshSettings,
     surface: ClosestPoints,
     size_weight: float,
     with_uv: bool,
@@ -268,11 +268,12 @@ def _remesh_parts(
                 part_field,
                 own,
                 edge,
-                angle,
+                settings.crease,
                 target,
                 slack,
                 onto,
                 size_weight,
+                settings.adaptivity,
                 with_uv,
                 tell,
             )

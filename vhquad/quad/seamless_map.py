@@ -26,6 +26,7 @@ from vhquad.geometry.sparse import PositiveFactor
 from vhquad.mesh.rings import within_rings
 from vhquad.mesh.triangle import TriMesh, next_halfedge
 from vhquad.quad.map_energy import MapEnergy
+from vhquad.quad.sag import CreasePulls
 from vhquad.quad.seamless import SeamlessSpace, seamless_space
 from vhquad.quad.untangle import untangled
 
@@ -37,6 +38,7 @@ Ints = NDArray[np.int64]
 SIZE_WEIGHT = 0.1  # least one of sizes, against directions
 FEW_FOLDS = 50  # that are worth unfolding by themselves
 RINGS = 4  # of triangles around them
+PULLING_SOLVES = 2  # to find out which creases need pulling
 UNITS_PER_EDGE = 1 << 20
 """Integer units in a mean mesh edge: fine enough for any triangle, and products stay in int64."""
 
@@ -116,6 +118,7 @@ def solve_seamless_map(
     aligned: AlignedField,
     *,
     size_weight: float = SIZE_WEIGHT,
+    least_density: Floats | None = None,
     on_solve: Callable[[int, int], None] | None = None,
 ) -> SeamlessMap:
     """Seamless map of an aligned field; check ``is_valid`` on the result.
@@ -125,11 +128,14 @@ def solve_seamless_map(
     aligned : AlignedField
     size_weight : float
         Least weight of sizes against directions.
+    least_density : (3m,) float64, optional
+        Least quad edges per length along crease halfedges, as in :mod:`vhquad.quad.sag`.
     on_solve : callable, optional
         Called with (solves so far, folded triangles) after each solve.
     """
     space = seamless_space(aligned)
-    problem = _Problem(aligned, space, size_weight)
+    pulls = None if least_density is None else CreasePulls(aligned, space, least_density)
+    problem = _Problem(aligned, space, size_weight, pulls)
     solves = 0
 
     def attempt(weight: Floats) -> tuple[Floats, SeamlessMap]:
@@ -146,6 +152,7 @@ def solve_seamless_map(
         return unknowns, candidate
 
     even = np.ones(aligned.mesh.n_faces)
+    problem.pull_creases(even)
     first, best = attempt(even)
     if best.is_valid:
         return best
@@ -168,7 +175,13 @@ def solve_seamless_map(
 class _Problem:
     """The quadratic energy over the seamless space."""
 
-    def __init__(self, aligned: AlignedField, space: SeamlessSpace, size_weight: float) -> None:
+    def __init__(
+        self,
+        aligned: AlignedField,
+        space: SeamlessSpace,
+        size_weight: float,
+        pulls: CreasePulls | None,
+    ) -> None:
         mesh = aligned.mesh
         self.mesh = mesh
         self.wedge = space.wedge
@@ -190,6 +203,7 @@ class _Problem:
         self.basis = (space.basis / space.denominator).tocsr()
         self.transpose = self.basis.T.tocsr()
         self.denominator = space.denominator
+        self.pulls = pulls
         self._factor: PositiveFactor | None = None  # of the last solve; weights alone change
 
     @cached_property
@@ -214,13 +228,25 @@ class _Problem:
             blocks.append(coo_matrix(entries, shape=(n, n)).tocsr())
             pull = (self.size_weight * wa * self.stretch)[:, None] * along
             right += np.bincount(2 * self.wedge.ravel() + axis, pull.ravel(), n)
-        matrix = (self.transpose @ (blocks[0] + blocks[1]) @ self.basis).tocsc()
+        energy = blocks[0] + blocks[1]
+        if self.pulls is not None:
+            energy = energy + self.pulls.matrix
+            right += self.pulls.right
+        matrix = (self.transpose @ energy @ self.basis).tocsc()
         # Charts may drift together where nothing ties them down: hold them softly. The wanted
         # gradients do not care, so a weak pull on all unknowns changes nothing visible.
         matrix = matrix + diags(np.full(matrix.shape[0], 1e-9 * matrix.diagonal().mean()))
         factor = PositiveFactor(matrix, like=self._factor)
         self._factor = factor
         return np.asarray(factor.solve(np.asarray(self.transpose @ right)))
+
+    def pull_creases(self, weight: Floats) -> None:
+        """Pull from now on where the map has too few quads along creases."""
+        if self.pulls is None:
+            return
+        for _ in range(PULLING_SOLVES):
+            if not self.pulls.tighten(np.asarray(self.basis @ self.solve(weight))):
+                break
 
     def corners(self, unknowns: Floats) -> NDArray[np.complex128]:
         """Chart coordinates of the corners; (m, 3) complex."""
