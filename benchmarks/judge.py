@@ -146,10 +146,16 @@ def segment_distance(queries: Floats, points: Floats, edges: Ints) -> Floats:
 
 
 def sharp_edges(points: Floats, triangles: Ints) -> Ints:
-    """Edges whose faces turn by more than CREASE degrees, (e, 2)."""
+    """Edges whose faces turn by more than CREASE degrees, (e, 2).
+
+    A triangle without height has no normal, and its edges no angle: they are left out.
+    """
     p = points[triangles]
     normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    area = np.linalg.norm(normal, axis=1)
+    longest = np.linalg.norm(np.roll(p, -1, axis=1) - p, axis=2).max(axis=1)
+    flat = area <= ON_CREASE * np.linalg.norm(np.ptp(points, axis=0)) * longest
+    normal /= np.maximum(area, 1e-300)[:, None]
     directed = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
     face = np.repeat(np.arange(len(triangles)), 3)
     key = np.sort(directed, axis=1)
@@ -157,7 +163,8 @@ def sharp_edges(points: Floats, triangles: Ints) -> Ints:
     same = np.flatnonzero((key[order][1:] == key[order][:-1]).all(axis=1))
     a, b = order[same], order[same + 1]
     turn = np.einsum("ei,ei->e", normal[face[a]], normal[face[b]])
-    return key[a][turn < np.cos(np.radians(CREASE))]
+    sharp = (turn < np.cos(np.radians(CREASE))) & ~flat[face[a]] & ~flat[face[b]]
+    return key[a][sharp]
 
 
 def spread(points: Floats, edges: Ints) -> Floats:

@@ -57,6 +57,15 @@ def test_cube_has_eight_corners_on_its_creases(tmp_path: Path) -> None:
     assert found["crease_off"] == pytest.approx(100 * 0.05 / np.sqrt(3) * 8 / 12, rel=0.06)
 
 
+def test_triangles_without_area_make_no_creases() -> None:
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0]], dtype=float)
+    # The last vertex lies on the diagonal: one triangle there has no area.
+    flat = np.array([[0, 1, 2], [0, 2, 4], [0, 4, 3], [4, 2, 3]])
+    assert len(judge.sharp_edges(square, flat)) == 0
+    square[4, 2] = 0.5
+    assert len(judge.sharp_edges(square, flat)) > 0
+
+
 def test_border(tmp_path: Path) -> None:
     quads = quad_grid(4, 3)
     found = judged(quads, grid(8, 6), tmp_path)
