@@ -18,6 +18,7 @@ from tests.quad_meshes import (
 from vhquad.errors import MeshError
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.quad import QuadMesh
+from vhquad.quad.aspects import smoothed_aspects
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.distortion import (
     corner_jacobians,
@@ -182,6 +183,54 @@ def test_gradient_is_that_of_the_energy(rng: np.random.Generator) -> None:
         # Central differences: error about h², far below the tolerance.
         slope = (at.gradient * direction).sum()
         assert (ahead - behind) / (2 * h) == pytest.approx(slope, rel=1e-5)
+
+
+def test_gradient_towards_oblong_quads(rng: np.random.Generator) -> None:
+    v, q = cube_sphere(2)
+    x = v + 0.2 * rng.normal(size=v.shape)
+    n, size = quad_normals(x, q), rng.uniform(0.5, 1.0, len(q))
+    aspect = rng.uniform(0.5, 2.0, len(q))
+    along = rng.normal(size=(len(q), 3))
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+
+    def cost(x: np.ndarray) -> tuple[float, np.ndarray]:
+        at = distortion(x, q, n, size, 0.1, 0.3, aspect=aspect)
+        off, pull = misalignment(x, q, n, size, along, aspect=aspect)
+        return at.energy + off, at.gradient + pull
+
+    move, h = rng.normal(size=v.shape), 1e-6
+    slope = (cost(x + h * move)[0] - cost(x - h * move)[0]) / (2 * h)
+    # Central differences, as above.
+    assert slope == pytest.approx((cost(x)[1] * move).sum(), rel=1e-5)
+
+
+def test_a_rectangle_is_the_minimum_if_asked_for() -> None:
+    v, q = quad_grid(1, 1)
+    n, size, aspect = np.array([[0, 0, 1.0]]), np.ones(1), np.full(1, 4.0)
+    x = v * [2.0, 0.5, 1.0]  # edges 0 and 2 run along x
+    at = distortion(x, q, n, size, 1e-9, 0.3, aspect=aspect)
+    assert at.energy == pytest.approx(4 * 1.3, abs=1e-12)
+    assert np.abs(at.gradient).max() < 1e-12
+
+
+def test_aspects_are_those_of_a_grid_however_quads_are_numbered(rng: np.random.Generator) -> None:
+    v, q = quad_grid(8, 6)
+    turn = rng.integers(0, 4, len(q))
+    turned = q[np.arange(len(q))[:, None], (np.arange(4) + turn[:, None]) % 4]
+    even = np.where(turn % 2 == 0, 1.5, 1 / 1.5)
+    # 1: averaging changes nothing where all are alike; 2: none is longer than twice its width.
+    np.testing.assert_allclose(smoothed_aspects(v * [1.5, 1, 1], turned), even, rtol=1e-12)
+    far = smoothed_aspects(v * [5.0, 1, 1], turned)
+    np.testing.assert_allclose(np.maximum(far, 1 / far), 2.0, rtol=1e-12)
+
+
+def test_aspects_of_uneven_rows_even_out() -> None:
+    v, q = quad_grid(10, 10)
+    x = v.copy()
+    x[:, 0] += np.where(v[:, 0] % 2 == 1, 0.3, 0.0)  # columns 1.3 and 0.7 wide in turn
+    off = lambda rounds: float(np.abs(np.log(smoothed_aspects(x, q, rounds))).mean())  # noqa: E731
+    assert off(0) == pytest.approx(0.5 * np.log(1.3 / 0.7))
+    assert off(2) < 0.4 * off(0)
 
 
 def test_cross_products_and_neighbouring_corners(rng: np.random.Generator) -> None:

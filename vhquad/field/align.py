@@ -34,6 +34,7 @@ DEFAULT_QUADS = 2000
 SHORTEST_CREASE = 2.0  # edge lengths; of what is left where part of a crease was dropped
 LOOSE_CREASE = 1.5  # edge lengths; what dropping leaves as a shorter loose branch goes too
 SETTLE = 2.0  # edge lengths over which singularities may drift to better places
+TRUST_POWER = 4  # of the confidence: half of it is little to give up sizes for
 MOST_SPLITS = 12  # rounds of splitting where vertices are too few; one or two happen
 
 
@@ -122,6 +123,8 @@ class AlignedField:
         from the face's halfedge 0, radians.
     size : (m,) float64 or None
         Wanted quad edge length.
+    confidence : (m,) float64 or None
+        That of the field, in [0, 1]; None means 1 everywhere.
     feature : (3m,) bool
         Halfedges on a boundary or crease (both halfedges of a crease).
     axis : (3m,) int64
@@ -144,6 +147,7 @@ class AlignedField:
     parent_face: Ints
     angle: Floats
     size: Floats | None
+    confidence: Floats | None
     feature: Bools
     axis: Ints
     rotation: Ints
@@ -152,6 +156,16 @@ class AlignedField:
     sector_vertex: Ints
     sector_is_feature: Bools
     report: AlignReport
+
+    @property
+    def trust(self) -> Floats:
+        """How far directions go before even sizes, in [0, 1]; (m,).
+
+        A field that does not say how sure it is earns none.
+        """
+        if self.confidence is None:
+            return np.zeros(self.mesh.n_faces)
+        return np.asarray(self.confidence**TRUST_POWER)
 
 
 def align_field(
@@ -300,6 +314,7 @@ def _pack(
         parent_face=refinement.parent,
         angle=matched.angle,
         size=None if field.size is None else field.size[refinement.parent],
+        confidence=None if field.confidence is None else field.confidence[refinement.parent],
         feature=matched.feature,
         axis=matched.axis,
         rotation=matched.rotation,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, diags_array
 
 from vhquad.geometry.sparse import PositiveFactor
-from vhquad.quad.distortion import barrier_width, cross, last_corner, next_corner, unit
+from vhquad.quad.distortion import barrier_width, cross, last_corner, next_corner, shapes, unit
 from vhquad.quad.sliding import (
     GUIDANCE,
     Problem,
@@ -44,10 +44,11 @@ def spread(problem: Problem, state: State, factor: PositiveFactor, iterations: i
     quads = problem.quads
     low, high = SQUARE_RANGE[0] * problem.size, SQUARE_RANGE[1] * problem.size
     corners = quads.reshape(-1)
+    shape = shapes(problem.aspect, len(quads))
     for _ in range(iterations):
         n = reference_normals(problem, state.normals)
         p = state.vertices[quads]
-        edge = next_corner(p) - p
+        edge = (next_corner(p) - p) / shape
         # Edges of a square: d, n x d, -d, -(n x d); the least squares fit of d, in the plane.
         d = edge[:, 0] - edge[:, 2] + cross(edge[:, 1] - edge[:, 3], n)
         d -= np.einsum("ki,ki->k", d, n)[:, None] * n
@@ -55,7 +56,7 @@ def spread(problem: Problem, state: State, factor: PositiveFactor, iterations: i
         d = side[:, None] * unit(unit(d) + GUIDANCE * problem.along)
         turned = cross(n, d)
         wanted = np.stack([d, turned, -d, -turned], axis=1)
-        pull = (wanted - edge) / (problem.size**2)[:, None, None]
+        pull = (wanted - edge) / ((problem.size**2)[:, None, None] * shape)
         force = last_corner(pull) - pull
         total = [
             np.bincount(corners, force[..., i].reshape(-1), len(problem.fixed)) for i in range(3)
@@ -80,7 +81,8 @@ def laplacian_factor(problem: Problem) -> PositiveFactor:
     free = np.flatnonzero(~problem.fixed)
     tail = problem.quads.T.reshape(-1)
     head = np.roll(problem.quads, -1, axis=1).T.reshape(-1)
-    weight = np.tile(1.0 / problem.size**2, 4)
+    length = problem.size[:, None] * shapes(problem.aspect, len(problem.quads))[..., 0]
+    weight = (1.0 / length**2).T.reshape(-1)
     half = coo_matrix((weight, (tail, head)), shape=(n, n)).tocsr()
     adjacency = half + half.T
     degree = np.asarray(adjacency.sum(axis=1)).reshape(-1)

@@ -30,6 +30,7 @@ __all__ = [
     "misalignment",
     "next_corner",
     "quad_normals",
+    "shapes",
     "unit",
 ]
 
@@ -112,6 +113,7 @@ def distortion(
     epsilon: float,
     size_weight: float,
     with_gradient: bool = True,
+    aspect: Floats | None = None,
 ) -> Distortion:
     """Evaluate the energy of the module's head.
 
@@ -129,9 +131,12 @@ def distortion(
         ε > 0 and λ >= 0.
     with_gradient : bool
         Without it the gradient is left empty, at half the time.
+    aspect : (k,) float64, optional
+        Wanted length of edges 0 and 2 over that of edges 1 and 3. Default: 1, squares.
     """
+    shape = shapes(aspect, len(quads))
     p = vertices[quads]
-    e1 = next_corner(p) - p
+    e1 = (next_corner(p) - p) / shape
     e2 = -last_corner(e1)
     n = normals[:, None, :]
     per_area = (1.0 / size**2)[:, None]
@@ -146,6 +151,8 @@ def distortion(
     by_area = (size_weight * d / chi - cost / root)[..., None] * per_area[..., None]
     g1 = by_stretch * e1 + by_area * cross(e2, n)
     g2 = by_stretch * e2 + by_area * cross(n, e1)
+    g1 /= shape
+    g2 /= last_corner(shape)
     g = last_corner(g1) + next_corner(g2) - g1 - g2
     return Distortion(float(cost.sum()), _gathered(g, quads, len(vertices)), d)
 
@@ -157,12 +164,13 @@ def misalignment(
     size: Floats,
     along: Floats,
     with_gradient: bool = True,
+    aspect: Floats | None = None,
 ) -> tuple[float, Floats]:
     """How far edges run off given directions: half the squared share of each edge across, by s².
 
     Parameters
     ----------
-    vertices, quads, normals, size, with_gradient
+    vertices, quads, normals, size, with_gradient, aspect
         As in :func:`distortion`.
     along : (k, 3) float64
         Unit direction for edges 0 and 2 of each quad, either way; edges 1 and 3 should run at a
@@ -177,12 +185,19 @@ def misalignment(
     second = cross(normals, first)
     across = np.stack([second, first, second, first], axis=1)
     p = vertices[quads]
-    share = np.einsum("kci,kci->kc", next_corner(p) - p, across) / size[:, None]
+    length = size[:, None] * shapes(aspect, len(quads))[..., 0]
+    share = np.einsum("kci,kci->kc", next_corner(p) - p, across) / length
     energy = 0.5 * float((share**2).sum())
     if not with_gradient:
         return energy, np.zeros((0, 3))
-    g = (share / size[:, None])[..., None] * across
+    g = (share / length)[..., None] * across
     return energy, _gathered(last_corner(g) - g, quads, len(vertices))
+
+
+def shapes(aspect: Floats | None, n_quads: int) -> Floats:
+    """Wanted lengths of the four edges of each quad, of the root of its area; (k, 4, 1)."""
+    root = np.ones(n_quads) if aspect is None else np.sqrt(aspect)
+    return np.stack([root, 1.0 / root, root, 1.0 / root], axis=1)[..., None]
 
 
 def _gathered(corners: Floats, quads: Ints, n: int) -> Floats:

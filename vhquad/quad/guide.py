@@ -27,6 +27,11 @@ class FieldGuide:
         self._surface = ClosestPoints(aligned.mesh)
         self._axis = to_3d(np.exp(1j * aligned.angle), face_axes(aligned.mesh))
         self._normal = aligned.mesh.face_normals
+        self._trust = aligned.trust
+
+    def trust(self, points: Floats) -> Floats:
+        """Trust in the cross at each point, in [0, 1]; (q,)."""
+        return np.asarray(self._trust[self._surface.query(points).face])
 
     def along(self, points: Floats, near: Floats) -> Floats:
         """The arm of the cross at each point that is nearest to a direction; (q, 3), unit."""

@@ -15,6 +15,7 @@ from vhquad.quad.distortion import (
     distortion,
     misalignment,
     quad_normals,
+    shapes,
     unit,
 )
 
@@ -48,11 +49,12 @@ class Problem:
     surface: ClosestPoints
     curves: CurveConstraints
     fixed: Bools
-    size: Floats  # (k,) wanted edge length of each quad
+    size: Floats  # (k,) wanted edge length of each quad, the root of its area
     on_curve: Ints  # vertices that slide on a curve
     reach: Floats  # (n,) least wanted edge length around each vertex: the longest step
     trust: Floats  # (n,) weight of a vertex's surface normal in its quads' reference normals
     along: Floats  # (k, 3) unit direction for edges 0 and 2 of each quad; 0 for any
+    aspect: Floats  # (k,) wanted length of edges 0 and 2 over that of edges 1 and 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,17 +93,21 @@ def make_problem(
     fixed: Bools,
     size: Floats,
     along: Floats | None = None,
+    aspect: Floats | None = None,
 ) -> Problem:
     """Derive what stays the same from the parts of the problem."""
     if along is None:
         along = np.zeros((len(quads), 3))
+    if aspect is None:
+        aspect = np.ones(len(quads))
     reach = np.full(len(fixed), np.inf)
-    np.minimum.at(reach, quads.reshape(-1), np.repeat(size, 4))
+    length = size[:, None] * shapes(aspect, len(quads))[..., 0]
+    np.minimum.at(reach, quads.reshape(-1), length.reshape(-1))
     sliding = (curves.curve >= 0) & ~fixed
     # A crease has two normals: prefer those of a quad's plain vertices.
     trust = np.where((curves.curve >= 0) | fixed, 0.01, 1.0)
     on_curve = np.flatnonzero(sliding)
-    return Problem(quads, surface, curves, fixed, size, on_curve, reach, trust, along)
+    return Problem(quads, surface, curves, fixed, size, on_curve, reach, trust, along, aspect)
 
 
 def place(problem: Problem, wanted: Floats, before: State | None) -> State:
@@ -167,10 +173,14 @@ def cost(
     problem: Problem, x: Floats, normals: Floats, epsilon: float, with_gradient: bool = True
 ) -> Distortion:
     """Distortion of the quads about some normals, and what their edges run off the field."""
-    out = distortion(x, problem.quads, normals, problem.size, epsilon, SIZE_WEIGHT, with_gradient)
+    out = distortion(
+        x, problem.quads, normals, problem.size, epsilon, SIZE_WEIGHT, with_gradient, problem.aspect
+    )
     if not problem.along.any():
         return out
-    off, pull = misalignment(x, problem.quads, normals, problem.size, problem.along, with_gradient)
+    off, pull = misalignment(
+        x, problem.quads, normals, problem.size, problem.along, with_gradient, problem.aspect
+    )
     return replace(out, energy=out.energy + GUIDANCE * off, gradient=out.gradient + GUIDANCE * pull)
 
 

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from vhquad.errors import MeshError
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.rings import separate_parts, within_rings
+from vhquad.quad.aspects import smoothed_aspects
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.descent import better, descend, laplacian_factor, spread
 from vhquad.quad.distortion import corner_jacobians, cross
@@ -70,7 +71,8 @@ def smooth_quads(
         Wanted edge length near each vertex. Default: the given distribution, smoothed. Only
         ratios count, since the sizes are scaled to fill the surface.
     guide : FieldGuide, optional
-        Field whose directions the edges should keep.
+        Field whose directions the edges should keep. Where it is sure, quads stay about as much
+        longer than wide as they are: squares of the same rows would turn their edges off it.
 
     Returns
     -------
@@ -100,7 +102,10 @@ def smooth_quads(
         size = np.array(target_edge, dtype=np.float64)[q].mean(axis=1)
         size *= np.sqrt(surface.mesh.area / (size**2).sum())
     hold[np.setdiff1d(np.arange(len(x)), q)] = True
-    problem = make_problem(q, surface, bound, hold, size)
+    aspect = np.ones(len(q))
+    if guide is not None:
+        aspect = smoothed_aspects(x, q) ** guide.trust(x[q].mean(axis=1))
+    problem = make_problem(q, surface, bound, hold, size, aspect=aspect)
     problem, start = _guided(problem, place(problem, x, None), guide)
     if hold.all() or iterations <= 0:
         return start.vertices
@@ -177,6 +182,7 @@ def _solve_patch(
         (held | problem.fixed)[used],
         problem.size[inside],
         problem.along[inside] if guided else None,
+        problem.aspect[inside] if guided else None,
     )
     if part.fixed.all():
         return state

@@ -1,0 +1,56 @@
+"""How much longer than wide quads are, and are to stay: what rows of quads along a field need.
+
+The rows between two lines of a field are as wide as the lines are apart, whatever the length of
+their quads, so quads that follow the field are oblong, and to square them is to bend the rows.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vhquad.quad.distortion import next_corner
+
+__all__ = ["smoothed_aspects"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+ROUNDS = 2  # of averaging: rounding to whole quads makes neighbouring rows uneven
+MOST = 2.0  # longest quad to ask for, of its width
+FLAT = 1e-9  # of the longest edge: shorter ones tell no aspect
+
+_SIGN = np.array([1.0, -1.0, 1.0, -1.0])
+
+
+def smoothed_aspects(vertices: Floats, quads: Ints, rounds: int = ROUNDS) -> Floats:
+    """Length of edges 0 and 2 of each quad over that of edges 1 and 3, averaged over neighbours.
+
+    Logarithms are averaged, seen along the shared edge: what is long for one quad may be wide for
+    the next. Around an irregular vertex the aspects contradict each other and go to 1.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+    quads : (k, 4) int64
+        Corners of a manifold mesh.
+    rounds : int
+        How often to average.
+
+    Returns
+    -------
+    (k,) float64
+        Between 1/2 and 2.
+    """
+    p = vertices[quads]
+    length = np.linalg.norm(next_corner(p) - p, axis=2)
+    length = np.maximum(length[:, :2] + length[:, 2:], FLAT * max(float(length.max()), 1e-300))
+    value = np.clip(np.log(length[:, 0] / length[:, 1]), -np.log(MOST), np.log(MOST))
+    ends = np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    _, edge = np.unique(ends[:, 0] * len(vertices) + ends[:, 1], return_inverse=True)
+    edge = edge.reshape(-1)
+    count = np.bincount(edge)
+    for _ in range(rounds):
+        along = np.bincount(edge, (value[:, None] * _SIGN).reshape(-1)) / count
+        value = (along[edge].reshape(-1, 4) * _SIGN).mean(axis=1)
+    return np.asarray(np.exp(value))
