@@ -14,6 +14,7 @@ from vhquad.mesh.triangle import next_halfedge
 from vhquad.quad.seamless_map import (
     UNITS_PER_EDGE,
     rotate,
+    size_weights,
     solve_seamless_map,
     twice_area,
 )
@@ -107,6 +108,24 @@ def test_directions_are_kept_before_sizes() -> None:
         return float(np.degrees(np.arccos(np.clip(cosine, -1, 1))).mean())
 
     assert lean(0.1) < 0.6 * lean(1.0)
+
+
+def test_sizes_count_less_where_the_field_is_sure() -> None:
+    turn = np.array([0.0, 0.5, 1.0, 3.0])
+    doubted, sure = (size_weights(turn, np.full(4, t)) for t in (0.0, 1.0))
+    # 1: in doubt, the turn of the surface, at least 0.1; 2: if sure, a tenth of its third power.
+    np.testing.assert_allclose(doubted, [0.1, 0.5, 1.0, 1.0])
+    np.testing.assert_allclose(sure, [0.01, 0.0125, 0.1, 1.0])
+    # 3: the geometric mean between, and sizes count again where the surface turns much.
+    np.testing.assert_allclose(size_weights(turn, np.full(4, 0.5)), np.sqrt(doubted * sure))
+    # 4: half a confidence earns little trust, none said earns none.
+    s = stages("blob")
+    size = np.full(s.aligned.mesh.n_faces, s.edge)
+    low = replace(s.aligned, size=size, confidence=np.zeros(len(size)))
+    assert low.trust.max() == 0.0
+    assert replace(low, confidence=np.full(len(size), 0.5)).trust.max() == 0.0625
+    assert replace(low, confidence=None).trust.max() == 0.0
+    assert replace(low, confidence=np.ones(len(size))).trust.min() == 1.0
 
 
 def test_motion_and_scale_change_nothing(rng: np.random.Generator) -> None:

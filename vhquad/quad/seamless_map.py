@@ -4,11 +4,11 @@ The map minimises ``sum_f w_f A_f |grad (u, v) - s_f (X, X_perp)|^2`` over the s
 (Bommes et al. 2009, eq. 5, without any rounding of singularities), where the share of the gradient
 of u along X, and of v along X_perp, counts for less than the share across: a map cannot have the
 directions of a field and its sizes both, and edges that run off are seen sooner than quads that are
-longer than wide. Only where the surface turns much within a quad, as at the tip of a limb, sizes
-count as much, else the tip is cut off. The weights of folded and strongly distorted triangles are
-raised until no triangle is folded (local stiffening, ibid. 5.4) and the map turns by the right
-angle around every vertex; when few folds are left, unfolding their surroundings may end it sooner
-(:mod:`vhquad.quad.untangle`).
+longer than wide. The surer the field is, the less sizes count. Only where the surface turns much
+within a quad, as at the tip of a limb, they count as much, else the tip is cut off. The weights of
+folded and strongly distorted triangles are raised until no triangle is folded (local stiffening,
+ibid. 5.4) and the map turns by the right angle around every vertex; when few folds are left,
+unfolding their surroundings may end it sooner (:mod:`vhquad.quad.untangle`).
 """
 
 from __future__ import annotations
@@ -35,7 +35,9 @@ __all__ = ["SIZE_WEIGHT", "SeamlessMap", "solve_seamless_map"]
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-SIZE_WEIGHT = 0.1  # least one of sizes, against directions
+SIZE_WEIGHT = 0.01  # least one of sizes, against directions: where the field is sure
+DOUBTED_WEIGHT = 0.1  # the same where it is not
+TURN_POWER = 3  # where the field is sure, sizes count by so high a power of how the surface turns
 FEW_FOLDS = 50  # that are worth unfolding by themselves
 RINGS = 4  # of triangles around them
 PULLING_SOLVES = 2  # to find out which creases need pulling
@@ -197,8 +199,9 @@ class _Problem:
         change = np.einsum("fk,fki->fi", self.gradient, normals)  # complex: d/dx + i d/dy
         turn = np.linalg.norm(change, axis=1) * size  # radians within a quad
         if aligned.size is None:
-            turn = np.ones(mesh.n_faces)
-        self.size_weight = np.clip(turn, size_weight, 1.0)
+            self.size_weight = np.ones(mesh.n_faces)
+        else:
+            self.size_weight = np.maximum(size_weights(turn, aligned.trust), size_weight)
         self.target = self.stretch * np.exp(1j * space.angle)
         self.basis = (space.basis / space.denominator).tocsr()
         self.transpose = self.basis.T.tocsr()
@@ -269,6 +272,21 @@ class _Problem:
             bad |= off > 1.5**2
         bad = within_rings(self.mesh.faces, bad, schedule.rings)
         return np.where(bad, np.minimum(schedule.factor * weight, schedule.cap), weight)
+
+
+def size_weights(turn: Floats, trust: Floats) -> Floats:
+    """Weight of sizes against directions at each face; (m,).
+
+    Parameters
+    ----------
+    turn : (m,) float64
+        Radians by which the surface turns within a quad.
+    trust : (m,) float64
+        In the directions of the field, from 0 to 1.
+    """
+    doubted = np.clip(turn, DOUBTED_WEIGHT, 1.0)
+    sure = np.clip(DOUBTED_WEIGHT * turn**TURN_POWER, SIZE_WEIGHT, 1.0)
+    return np.asarray(doubted ** (1.0 - trust) * sure**trust)
 
 
 def _local_corners(mesh: TriMesh) -> NDArray[np.complex128]:
