@@ -34,7 +34,7 @@ DEFAULT_QUADS = 2000
 SHORTEST_CREASE = 2.0  # edge lengths; of what is left where part of a crease was dropped
 LOOSE_CREASE = 1.5  # edge lengths; what dropping leaves as a shorter loose branch goes too
 SETTLE = 2.0  # edge lengths over which singularities may drift to better places
-TRUST_POWER = 4  # of the confidence: half of it is little to give up sizes for
+SURE = 0.9  # confidence from which on directions may go before even sizes
 MOST_SPLITS = 12  # rounds of splitting where vertices are too few; one or two happen
 
 
@@ -165,7 +165,7 @@ class AlignedField:
         """
         if self.confidence is None:
             return np.zeros(self.mesh.n_faces)
-        return np.asarray(self.confidence**TRUST_POWER)
+        return np.clip((self.confidence - SURE) / (1.0 - SURE), 0.0, 1.0)
 
 
 def align_field(
