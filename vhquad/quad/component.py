@@ -146,7 +146,8 @@ def remesh_component(
     Within ``slack`` quads any count is near enough. ``adaptivity`` is how far sizes follow curved
     creases: those that were given, or on a mesh where most of what is sharp are creases; on others
     the doubtful ones would take the quads that shapes need. Where quads stay folded, another
-    attempt may do better. If none meets the count, it is the first whose count is about the nearest.
+    attempt may do better. If none meets the count, it is the first whose count is about the
+    nearest.
     """
     watch = Watch()
     length = float(np.sqrt(mesh.area / target))
