@@ -182,7 +182,7 @@ class _Problem:
         aligned: AlignedField,
         space: SeamlessSpace,
         size_weight: float,
-        pulls: CreasePulls | None,
+        pulls: CreasePulls | None = None,
     ) -> None:
         mesh = aligned.mesh
         self.mesh = mesh
