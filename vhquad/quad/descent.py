@@ -31,6 +31,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 MEMORY = 6
+STALE, STALE_STEPS = 3e-4, 5  # relative gain below which so many steps, without a fold, are the last
 SQUARE_RANGE = (0.5, 2.0)  # of the wanted size, for the squares of `spread`
 
 
@@ -110,8 +111,8 @@ def descend(
     factor : PositiveFactor
         Of :func:`laplacian_factor`.
     iterations : int
-        Steps. After them it goes on while quads are folded, as long as ``patience`` steps have
-        not passed without one less.
+        Steps at most; fewer where the energy has settled. After them it goes on while quads are
+        folded, as long as ``patience`` steps have not passed without one less.
     patience : int
 
     Returns
@@ -121,6 +122,7 @@ def descend(
     """
     best, best_at, number = state, 0, 0
     history: list[tuple[Floats, Floats]] = []
+    energies: list[float] = []  # of the last steps, all without a fold
     gradient, moved, last_epsilon = np.zeros((0, 3)), np.zeros((0, 3)), 0.0
     while number < iterations or (best.folded.any() and number < best_at + patience):
         number += 1
@@ -157,7 +159,12 @@ def descend(
             if state.folded.sum() < best.folded.sum():
                 best_at = number
             best = state
-        if scale * length < 1e-7:
+        energies = [] if state.folded.any() else [*energies, state.energy][-STALE_STEPS - 1 :]
+        settled = (
+            len(energies) > STALE_STEPS
+            and energies[0] - min(energies[1:]) < STALE * state.energy
+        )
+        if settled or scale * length < 1e-7:
             break
     return best
 
