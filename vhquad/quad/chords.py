@@ -153,7 +153,9 @@ class _Chain:
     def best(self, s: Floats) -> Floats:
         """Arc lengths after all rounds."""
         for _ in range(ROUNDS):
-            s = self.fitted(s)
+            last, s = s, self.fitted(s)
+            if np.array_equal(s, last):
+                break
         return s
 
 

@@ -14,7 +14,15 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, diags_array
 
 from vhquad.geometry.sparse import PositiveFactor
-from vhquad.quad.distortion import barrier_width, cross, last_corner, next_corner, shapes, unit
+from vhquad.quad.distortion import (
+    SHARP,
+    barrier_width,
+    cross,
+    last_corner,
+    next_corner,
+    shapes,
+    unit,
+)
 from vhquad.quad.sliding import (
     GUIDANCE,
     Problem,
@@ -31,7 +39,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 MEMORY = 6
-STALE, STALE_STEPS = 3e-4, 5  # relative gain below which so many steps, without a fold, are the last
+STALE, STALE_STEPS = 3e-4, 5  # where so many steps, free of folds, gain less, relative, it ends
 SQUARE_RANGE = (0.5, 2.0)  # of the wanted size, for the squares of `spread`
 
 
@@ -45,7 +53,7 @@ def spread(problem: Problem, state: State, factor: PositiveFactor, iterations: i
     quads = problem.quads
     low, high = SQUARE_RANGE[0] * problem.size, SQUARE_RANGE[1] * problem.size
     corners = quads.reshape(-1)
-    shape = shapes(problem.aspect, len(quads))
+    shape = shapes(problem.aspect, len(quads)).T[..., None]
     for _ in range(iterations):
         n = reference_normals(problem, state.normals)
         p = state.vertices[quads]
@@ -82,7 +90,7 @@ def laplacian_factor(problem: Problem) -> PositiveFactor:
     free = np.flatnonzero(~problem.fixed)
     tail = problem.quads.T.reshape(-1)
     head = np.roll(problem.quads, -1, axis=1).T.reshape(-1)
-    length = problem.size[:, None] * shapes(problem.aspect, len(problem.quads))[..., 0]
+    length = problem.size[:, None] * shapes(problem.aspect, len(problem.quads)).T
     weight = (1.0 / length**2).T.reshape(-1)
     half = coo_matrix((weight, (tail, head)), shape=(n, n)).tocsr()
     adjacency = half + half.T
@@ -128,8 +136,11 @@ def descend(
         number += 1
         normals = state.quad_normals
         epsilon = barrier_width(state.least)
-        now = cost(problem, state.vertices, normals, epsilon)
-        last, gradient = gradient, tangential(problem, state, now.gradient)
+        energy, slopes = state.energy, state.gradient
+        if epsilon != SHARP or not len(slopes):
+            now = cost(problem, state.vertices, normals, epsilon)
+            energy, slopes = now.energy, now.gradient
+        last, gradient = gradient, tangential(problem, state, slopes)
         if not 1 / 1.5 < epsilon / max(last_epsilon, 1e-300) < 1.5:
             history = []  # of another energy
         elif len(last):
@@ -150,7 +161,7 @@ def descend(
         for _ in range(12):
             ahead = state.vertices + scale * move
             trial = cost(problem, ahead, normals, epsilon, False).energy
-            if trial <= now.energy + 1e-4 * scale * slope:
+            if trial <= energy + 1e-4 * scale * slope:
                 break
             scale *= 0.5
         following = place(problem, state.vertices + scale * move, state)
@@ -161,8 +172,7 @@ def descend(
             best = state
         energies = [] if state.folded.any() else [*energies, state.energy][-STALE_STEPS - 1 :]
         settled = (
-            len(energies) > STALE_STEPS
-            and energies[0] - min(energies[1:]) < STALE * state.energy
+            len(energies) > STALE_STEPS and energies[0] - min(energies[1:]) < STALE * state.energy
         )
         if settled or scale * length < 1e-7:
             break

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from vhquad.mesh.closest import ClosestPoints, Hits
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.distortion import (
+    SHARP,
     Distortion,
     corner_jacobians,
     distortion,
@@ -67,7 +68,8 @@ class State:
     face: Ints  # (n,) face of the surface under each vertex
     quad_normals: Floats  # (k, 3) reference normals of the energy
     folded: Bools  # (k,)
-    energy: float  # at the least epsilon, to rank states
+    energy: float  # at the least barrier width, to rank states
+    gradient: Floats  # (n, 3) of that energy; (0, 3) while quads are folded
     least: float  # signed area of the worst corner, of the wanted square
 
 
@@ -101,7 +103,7 @@ def make_problem(
     if aspect is None:
         aspect = np.ones(len(quads))
     reach = np.full(len(fixed), np.inf)
-    length = size[:, None] * shapes(aspect, len(quads))[..., 0]
+    length = size[:, None] * shapes(aspect, len(quads)).T
     np.minimum.at(reach, quads.reshape(-1), length.reshape(-1))
     sliding = (curves.curve >= 0) & ~fixed
     # A crease has two normals: prefer those of a quad's plain vertices.
@@ -117,14 +119,17 @@ def place(problem: Problem, wanted: Floats, before: State | None) -> State:
     surface; it walks there instead.
     """
     line = problem.on_curve
-    hits = problem.surface.query(wanted)
-    normals = _smooth_normals(problem, hits)
-    x, face = np.array(hits.point), np.array(hits.face)
     if before is None:
+        hits = problem.surface.query(wanted)
+        x, face, normals = hits.point, hits.face, _smooth_normals(problem, hits)
         arc = np.zeros(len(x))
         arc[line] = problem.curves.locate(line, wanted[line])
         x[problem.fixed] = wanted[problem.fixed]
     else:
+        free = np.flatnonzero(~problem.fixed)
+        hits = problem.surface.query(wanted[free])
+        x, face, normals = before.vertices.copy(), before.face.copy(), before.normals.copy()
+        x[free], face[free], normals[free] = hits.point, hits.face, _smooth_normals(problem, hits)
         tangent = problem.curves.tangent(line, before.arc[line], 0.25 * problem.reach[line])
         along = np.einsum("vi,vi->v", wanted[line] - before.vertices[line], tangent)
         arc = before.arc.copy()
@@ -132,12 +137,10 @@ def place(problem: Problem, wanted: Floats, before: State | None) -> State:
         through = np.einsum("vi,vi->v", normals, before.normals) < SAME_SIDE
         through[line] = through[problem.fixed] = False
         walkers = np.flatnonzero(through)
-        walked = problem.surface.query_near(wanted[walkers], before.face[walkers])
-        x[walkers], face[walkers] = walked.point, walked.face
-        normals[walkers] = _smooth_normals(problem, walked)
-        keep = problem.fixed
-        x[keep], normals[keep] = before.vertices[keep], before.normals[keep]
-        face[keep] = before.face[keep]
+        if len(walkers):
+            walked = problem.surface.query_near(wanted[walkers], before.face[walkers])
+            x[walkers], face[walkers] = walked.point, walked.face
+            normals[walkers] = _smooth_normals(problem, walked)
     x[line] = problem.curves.position(line, arc[line])
     return measure(problem, x, arc, normals, face)
 
@@ -164,9 +167,9 @@ def measure(problem: Problem, x: Floats, arc: Floats, normals: Floats, face: Int
     folded = inverted | ((facing <= 0) & (nearest <= 0))
     trusted = ~folded & ((facing > 0.3) | (nearest > 0.7))
     reference = np.where(trusted[:, None], own, around)
-    at = cost(problem, x, reference, 1e-3, False)
+    at = cost(problem, x, reference, SHARP, not folded.any())
     least = float(at.area.min())
-    return State(x, arc, normals, face, reference, folded, at.energy, least)
+    return State(x, arc, normals, face, reference, folded, at.energy, at.gradient, least)
 
 
 def cost(
