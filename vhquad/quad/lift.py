@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import fmin_l_bfgs_b
 from scipy.sparse import coo_matrix, diags_array
 
 from vhquad.geometry.sparse import PositiveFactor
@@ -24,7 +23,7 @@ from vhquad.mesh.facing import FacingPoints
 from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.quality import flipped_quads, scaled_jacobians
 from vhquad.mesh.rings import separate_parts, within_rings
-from vhquad.quad.distortion import barrier_width, distortion, quad_normals, unit
+from vhquad.quad.distortion import SHARP, barrier_width, distortion, quad_normals, unit
 
 __all__ = ["lifted", "rim_vertices", "wrong_quads"]
 
@@ -183,10 +182,12 @@ def _squared(patch: _Patch, x: Floats) -> Floats:
 
 def _convex(patch: _Patch, x: Floats) -> Floats:
     """Corners pushed to be convex about their quads' own normals."""
+    from scipy.optimize import fmin_l_bfgs_b  # 0.1 s to import, and seldom needed
+
     x = x.copy()
     for _ in range(BARRIER_ROUNDS):
         normals = quad_normals(x, patch.quads)
-        least = distortion(x, patch.quads, normals, patch.size, 1e-3, SIZE_WEIGHT, False).area
+        least = distortion(x, patch.quads, normals, patch.size, SHARP, SIZE_WEIGHT, False).area
         epsilon = barrier_width(float(least.min()))
         given = (patch, x.copy(), patch.anchors(x), normals, epsilon)
         start = x[patch.free].ravel()
