@@ -16,8 +16,9 @@ from tests.quad_meshes import (
     triangulated,
 )
 from vhquad.errors import MeshError
-from vhquad.mesh.closest import ClosestPoints
+from vhquad.mesh.closest import ClosestPoints, Hits
 from vhquad.mesh.quad import QuadMesh
+from vhquad.quad import descent
 from vhquad.quad.aspects import smoothed_aspects
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.distortion import (
@@ -65,6 +66,25 @@ def test_closed_surfaces_unfold(quads: Quads, seed: int) -> None:
     assert corner_jacobians(out, quads[1], quad_normals(out, quads[1])).min() > 0.6
     # 4: on the surface, to rounding.
     assert surface.query(out).distance.max() < 1e-12
+
+
+def test_it_ends_where_nothing_is_left_to_gain(monkeypatch: pytest.MonkeyPatch) -> None:
+    quads = quad_torus()
+    x = shaken(quads, np.random.default_rng(0), 0.5, NOBODY)
+    surface = ClosestPoints(triangulated(quads))
+    ask, steps, least = surface.query, [0, 0], []
+    for number, stale in enumerate((descent.STALE, -1.0)):  # the latter: never
+
+        def counted(points: np.ndarray, number: int = number) -> Hits:
+            steps[number] += 1
+            return ask(points)
+
+        monkeypatch.setattr(surface, "query", counted)
+        monkeypatch.setattr(descent, "STALE", stale)
+        out = smooth_quads(x, quads[1], surface, iterations=120)
+        least.append(corner_jacobians(out, quads[1], quad_normals(out, quads[1])).min(axis=1))
+    assert steps[0] < 0.5 * steps[1]
+    np.testing.assert_allclose(least[0].mean(), least[1].mean(), atol=1e-3)
 
 
 def test_a_strip_squeezed_to_nothing_opens() -> None:
