@@ -8,15 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
-from rich import box
-from rich.console import Console
-from rich.table import Table
 
 from vhquad.cli.guard import Shell, complain
 from vhquad.jsonable import plain, write_json
 from vhquad.report import CheckReport, FieldReport, MeshCounts, RemeshReport
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from vhquad.learn.dataset import Dataset
     from vhquad.learn.train import TrainResult
     from vhquad.mesh.quality import QualityReport
@@ -203,6 +202,9 @@ def _time(seconds: float) -> str:
 
 
 def _table(title: str | None) -> Table:
+    from rich import box
+    from rich.table import Table
+
     table = Table(
         box=box.SIMPLE, show_header=False, title=title, title_justify="left", pad_edge=False
     )
@@ -212,4 +214,6 @@ def _table(title: str | None) -> Table:
 
 
 def _print(table: Table) -> None:
+    from rich.console import Console  # here, not above: --quiet and --json do without rich
+
     Console(markup=False, highlight=False).print(table)
