@@ -28,7 +28,7 @@ Bools = NDArray[np.bool_]
 SIZE_WEIGHT = 0.3
 ROUNDS = 12
 STEPS, MEMORY = 150, 20  # of L-BFGS in a round
-SETTLED = 2e-6  # relative gain of a step that ends a round: the next goes on from there
+SETTLED = 2e-7  # relative gain of a step that ends a round: the next goes on from there
 SIGNS = np.array([1.0, 1.0, -1.0, -1.0])  # of the squares in a determinant
 CLEAR = 1e-2  # determinant, of the wanted one, from which on a triangle will survive rounding
 
