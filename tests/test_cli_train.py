@@ -83,6 +83,7 @@ def test_refusals(invoke: Invoke, tmp_path: Path) -> None:
     assert invoke("train", tmp_path / "no").refused("vhquad preprocess")
     assert invoke("train", empty, "--steps", "1", "--epochs", "1").refused("--steps or --epochs")
     assert invoke("train", empty, "--init", "default", "--preset", "paper").refused("--init")
+    assert invoke("train", empty, "--blocks", "6").refused("--blocks", "--init")
     assert invoke("train", empty, "--preset", "huge").refused("huge", "starter")
     assert invoke("train", empty, "--resume", "--rate", "1").refused("--resume", "--rate")
     assert invoke("train").code == 2

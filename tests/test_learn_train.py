@@ -98,21 +98,28 @@ def test_a_seed_repeats(dataset: Dataset, tmp_path: Path) -> None:
     assert files[0] == files[1] != files[2]
 
 
-def test_starting_from_a_model(dataset: Dataset, tmp_path: Path) -> None:
-    """5. Fine-tuning starts where the model was, and keeps its settings."""
+@pytest.mark.parametrize("blocks", [None, MODEL.blocks + 1])
+def test_starting_from_a_model(dataset: Dataset, tmp_path: Path, blocks: int | None) -> None:
+    """5. Fine-tuning starts where the model was, deepened or not, and keeps its settings."""
     first = train(dataset.folder, tmp_path / "a", replace(SHORT, steps=8), MODEL)
     records: list[Record] = []
-    train(
+    second = train(
         dataset.folder,
         tmp_path / "b",
         replace(SHORT, steps=1, rate=1e-9, validate_every=1),
         init=first.model,
         on_record=records.append,
+        blocks=blocks,
+    )
+    assert load_model(second.model).settings == replace(
+        load_model(first.model).settings, blocks=blocks or MODEL.blocks
     )
     assert first.validation is not None
     assert records[-1].direction == pytest.approx(first.validation.direction, rel=1e-4)
     with pytest.raises(ConfigError, match="not both"):
         train(dataset.folder, tmp_path / "c", SHORT, MODEL, init=first.model)
+    with pytest.raises(ConfigError, match="more blocks"):
+        train(dataset.folder, tmp_path / "c", SHORT, MODEL, blocks=5)
 
 
 def test_several_datasets_are_mixed(dataset: Dataset, tmp_path: Path) -> None:

@@ -21,11 +21,12 @@ from tests.nn_inputs import (
     random_network,
     small_settings,
 )
-from vhquad.errors import ModelError
+from vhquad.errors import ConfigError, ModelError
 from vhquad.field.cross import CrossField
 from vhquad.learn.proxy import carry_back
 from vhquad.learn.targets import isotropic_remesh
 from vhquad.mesh.triangle import TriMesh
+from vhquad.nn.deepen import deepened
 from vhquad.nn.inputs import network_input
 from vhquad.nn.network import VectorHeatNet
 from vhquad.nn.settings import PRESETS
@@ -179,3 +180,25 @@ def test_presets_have_the_documented_sizes() -> None:
     paper = PRESETS["paper"]
     assert (paper.blocks, paper.channels, paper.k, paper.dropout) == (6, 256, 128, 0.5)
     assert VectorHeatNet(PRESETS["starter"]).n_parameters < 520_000
+
+
+@pytest.mark.parametrize("features", ["hks", "local"])
+@pytest.mark.parametrize("blocks", [2, 3, 5])
+def test_a_deeper_network_answers_the_same_and_learns(features: str, blocks: int) -> None:
+    """Bit for bit at first; then every new block gets gradients."""
+    mesh = as_input(blob_operators(features))
+    chosen = small_settings(**(LOCAL if features == "local" else {}))
+    network = random_network(chosen)
+    deeper = deepened(network, blocks)
+    before, after = network(mesh), deeper(mesh)
+    assert torch.equal(before.z, after.z)
+    assert torch.equal(before.size, after.size)
+    assert len(deeper.blocks) == blocks
+    after.z.square().sum().backward()
+    for block in deeper.blocks:
+        assert block.mlp.layers[-1].weight.grad.abs().max() > 0
+
+
+def test_a_deeper_network_keeps_its_blocks() -> None:
+    with pytest.raises(ConfigError, match="2 blocks"):
+        deepened(random_network(small_settings(blocks=2)), 1)

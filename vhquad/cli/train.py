@@ -87,6 +87,15 @@ def train(
             show_default=False,
         ),
     ] = None,
+    blocks: Annotated[
+        int | None,
+        typer.Option(
+            "--blocks",
+            metavar="N",
+            help="With --init: deepen the model to N blocks; the new ones change nothing at first.",
+            show_default=False,
+        ),
+    ] = None,
     device: Device = "auto",
     precision: Annotated[
         str | None,
@@ -118,6 +127,8 @@ def train(
         raise ConfigError("give --steps or --epochs, not both")
     if init is not None and preset is not None:
         raise ConfigError("give --init or --preset, not both: a trained model has its own sizes")
+    if blocks is not None and init is None:
+        raise ConfigError("--blocks deepens the model that --init names; add it")
     shell: Shell = ctx.obj
     from vhquad.cli.progress import Progress
     from vhquad.cli.show import show_training
@@ -129,7 +140,7 @@ def train(
 
         given = {"rate": rate, "precision": precision, "seed": seed, "steps": steps}
         if resume:
-            _refuse({**given, "epochs": epochs})
+            _refuse({**given, "epochs": epochs, "blocks": blocks})
         ready = [
             _prepared(folder, run / "dataset" / f"{place}", init, preset, progress)
             if holds_meshes(folder)
@@ -151,6 +162,7 @@ def train(
                 resume,
                 device,
                 on_record=_Watch(progress, settings.steps if settings else None),
+                blocks=blocks,
             )
         except KeyboardInterrupt:
             if (run / "checkpoint.safetensors").exists():

@@ -19,6 +19,7 @@ from vhquad.learn.device import choose_device
 from vhquad.learn.runstate import LossLog, Record, RunState, load_run, save_run
 from vhquad.learn.schedule import TrainSettings, learning_rate, mirrored, sample_of_step
 from vhquad.nn.checkpoint import Model, load_model, save_model
+from vhquad.nn.deepen import deepened
 from vhquad.nn.loss import field_loss
 from vhquad.nn.network import VectorHeatNet
 from vhquad.nn.settings import ModelSettings, preset
@@ -61,6 +62,7 @@ def train(
     device: str = "auto",
     on_record: Callable[[Record], None] | None = None,
     stop_after: int | None = None,
+    blocks: int | None = None,
 ) -> TrainResult:
     """Train a model on the training split of one or more datasets.
 
@@ -83,6 +85,8 @@ def train(
         Called with a Record after every step and every validation.
     stop_after : int, optional
         Stop, with a checkpoint, when so many steps are done in all.
+    blocks : int, optional
+        With ``init``: deepen the model to so many blocks (:mod:`vhquad.nn.deepen`).
 
     Returns
     -------
@@ -110,7 +114,7 @@ def train(
         if (folder / "checkpoint.safetensors").exists():
             raise ConfigError(f"{folder} holds a run already; add --resume, or name another folder")
         settings = TrainSettings() if settings is None else settings
-        state = RunState.new(_network(opened[0], model, init, settings.seed), settings)
+        state = RunState.new(_network(opened[0], model, init, blocks, settings.seed), settings)
     check_fit(state.network.settings, opened[0])
     state.to(target)
     log = LossLog(folder / "losses.csv", state.step)
@@ -156,12 +160,19 @@ def _items(datasets: list[Dataset], split: str) -> list[Item]:
 
 
 def _network(
-    dataset: Dataset, model: ModelSettings | None, init: Path | str | None, seed: int
+    dataset: Dataset,
+    model: ModelSettings | None,
+    init: Path | str | None,
+    blocks: int | None,
+    seed: int,
 ) -> VectorHeatNet:
     if init is not None:
         if model is not None:
             raise ConfigError("give either a model to start from or a preset, not both")
-        return load_model(init).network
+        network = load_model(init).network
+        return network if blocks is None else deepened(network, blocks, seed)
+    if blocks is not None:
+        raise ConfigError("only a model to start from can be given more blocks")
     base = preset("starter") if model is None else model
     chosen = replace(
         base,
