@@ -22,7 +22,7 @@ from vhquad.geometry.sparse import PositiveFactor
 __all__ = ["Spectrum", "smallest_eigenpairs"]
 
 _DENSE_BELOW = 400
-_EXACT_BELOW = 600  # a little above what is dense: from here on ARPACK is the slower one
+_EXACT_BELOW = 1000  # ARPACK in double precision takes half a second there, and more beyond
 
 _SHIFT = 0.1  # of the operator inverted, in units of the expected k-th eigenvalue
 _BLOCK = 8
