@@ -39,7 +39,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 MEMORY = 6
-STALE, STALE_STEPS = 3e-4, 5  # where so many steps, free of folds, gain less, relative, it ends
+STALE, STALE_STEPS = 1e-4, 5  # where so many steps, free of folds, gain less, relative, it ends
 SQUARE_RANGE = (0.5, 2.0)  # of the wanted size, for the squares of `spread`
 
 
