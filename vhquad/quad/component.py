@@ -42,7 +42,7 @@ from vhquad.quad.tmesh import build_tmesh
 from vhquad.report import MAP, ComponentReport, MeshCounts
 from vhquad.watch import Watch
 
-__all__ = ["MAP", "PAIRED", "Progress", "remesh_component"]
+__all__ = ["MAP", "PAIRED", "Component", "Progress", "remesh_component"]
 
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
@@ -114,43 +114,82 @@ _ATTEMPTS = (
 )
 
 
-def _attempts(
-    mesh: TriMesh, given: Ints | None, angle: float | None, length: float
-) -> Iterator[tuple[_Attempt, Ints]]:
-    """What to try in turn, with the creases kept; nothing twice where there are none to give up."""
-    tried: set[tuple[float, bytes]] = set()
-    for attempt in _ATTEMPTS:
-        creases = attempt.creases(mesh, given, angle, length)
-        key = (attempt.smoothing, creases.tobytes())
-        if key not in tried:
-            tried.add(key)
-            yield attempt, creases
+@dataclass(frozen=True, eq=False)
+class Component:
+    """A connected surface, and what is wanted of its quads.
+
+    Attributes
+    ----------
+    mesh : TriMesh
+        Connected.
+    field : CrossField
+        On its faces, with sizes.
+    surface : ClosestPoints
+        What the quads are to lie on: the mesh, or the finer one that it stands for.
+    target : int
+        Quads.
+    slack : float
+        Within so many quads of the target any count is near enough.
+    creases : (k, 2) int64 or None
+        Edges that were given as creases; None: those at which faces turn by ``crease_angle``
+        degrees, if that is no None either.
+    crease_angle : float or None
+    seam : (3m,) bool or None
+        As in :func:`vhquad.field.align.align_field`.
+    size_weight : float
+        As in :func:`vhquad.quad.seamless_map.solve_seamless_map`.
+    adaptivity : float
+        How far sizes follow curved creases, 0 to 1.
+    """
+
+    mesh: TriMesh
+    field: CrossField
+    surface: ClosestPoints
+    target: int
+    slack: float
+    creases: Ints | None
+    crease_angle: float | None
+    seam: Bools | None
+    size_weight: float
+    adaptivity: float
+
+    @property
+    def length(self) -> float:
+        """Mean edge length of the wanted quads."""
+        return float(np.sqrt(self.mesh.area / self.target))
+
+    def attempts(self) -> Iterator[tuple[_Attempt, Ints]]:
+        """What to try in turn, with the creases kept; nothing twice where none are to give up."""
+        tried: set[tuple[float, bytes]] = set()
+        for attempt in _ATTEMPTS:
+            creases = attempt.creases(self.mesh, self.creases, self.crease_angle, self.length)
+            key = (attempt.smoothing, creases.tobytes())
+            if key not in tried:
+                tried.add(key)
+                yield attempt, creases
+
+    def curving(self, creases: Ints) -> float:
+        """How far sizes follow these creases where they are curved.
+
+        Only where creases were given, or most of what is sharp are creases: elsewhere the doubtful
+        ones would take the quads that shapes need.
+        """
+        if self.creases is None and (
+            self.crease_angle is None
+            or not are_mostly_creases(self.mesh, creases, self.crease_angle)
+        ):
+            return 0.0
+        return self.adaptivity
 
 
-def remesh_component(
-    mesh: TriMesh,
-    field: CrossField,
-    given: Ints | None,
-    seam: Bools | None,
-    angle: float | None,
-    target: int,
-    slack: float,
-    surface: ClosestPoints,
-    size_weight: float,
-    adaptivity: float,
-    with_uv: bool,
-    tell: Progress,
-) -> Part:
+def remesh_component(wish: Component, with_uv: bool, tell: Progress) -> Part:
     """Quads of one component by the first attempt that gives a valid mesh of about the count.
 
-    Within ``slack`` quads any count is near enough. ``adaptivity`` is how far sizes follow curved
-    creases: those that were given, or on a mesh where most of what is sharp are creases; on others
-    the doubtful ones would take the quads that shapes need. Where quads stay folded, another
-    attempt may do better. If none meets the count, it is the first whose count is about the
-    nearest.
+    Where quads stay folded, another attempt may do better. If none meets the count, it is the first
+    whose count is about the nearest.
     """
     watch = Watch()
-    length = float(np.sqrt(mesh.area / target))
+    target, surface = wish.target, wish.surface
     reasons: list[str] = []
     rough: list[_Mapped] = []  # of another count than asked for
     done: list[tuple[int, _Mapped, QuadMesh]] = []
@@ -164,20 +203,14 @@ def remesh_component(
             reasons.append(f"{wrong} quads stay folded")
         return wrong == 0 or len(done) == MOST_POLISHED
 
-    for attempt, creases in _attempts(mesh, given, angle, length):
-        designed = given is not None or (
-            angle is not None and are_mostly_creases(mesh, creases, angle)
-        )
-        curved = adaptivity if designed else 0.0
+    for attempt, creases in wish.attempts():
         try:
-            mapped = _by_map(
-                mesh, field, creases, seam, target, size_weight, curved, attempt, watch, tell
-            )
+            mapped = _by_map(wish, creases, attempt, watch, tell)
         except (ParametrizationError, FieldError) as problem:
             reasons.append(str(problem))
             continue
         made = mapped.quads.n_quads
-        if mapped.miss(target) > np.log(NEAR_COUNT) and abs(made - target) > slack:
+        if mapped.miss(target) > np.log(NEAR_COUNT) and abs(made - target) > wish.slack:
             rough.append(mapped)
             reasons.append(f"{made} quads where {target} were asked for")
         elif good_enough(mapped):
@@ -198,12 +231,12 @@ def remesh_component(
                 uv = mapped.uv()
     else:
         with watch("fallback"):
-            quads = triangles_to_quads(mesh, target, angle=field.angle)
-        method, aligning = PAIRED, AlignReport(length)
+            quads = triangles_to_quads(wish.mesh, target, angle=wish.field.angle)
+        method, aligning = PAIRED, AlignReport(wish.length)
     tell("done", 1.0)
     report = ComponentReport(
-        vertices=mesh.n_vertices,
-        faces=mesh.n_faces,
+        vertices=wish.mesh.n_vertices,
+        faces=wish.mesh.n_faces,
         target=target,
         made=quads.n_quads,
         method=method,
@@ -217,16 +250,7 @@ def remesh_component(
 
 
 def _by_map(
-    mesh: TriMesh,
-    field: CrossField,
-    creases: Ints,
-    seam: Bools | None,
-    target: int,
-    size_weight: float,
-    curved: float,
-    attempt: _Attempt,
-    watch: Watch,
-    tell: Progress,
+    wish: Component, creases: Ints, attempt: _Attempt, watch: Watch, tell: Progress
 ) -> _Mapped:
     """Quads by an integer-grid map, their vertices where the map has them.
 
@@ -236,17 +260,17 @@ def _by_map(
         If there is no valid map, or its quads are not a valid mesh of the input's topology.
     """
     tell("align the field", 0.0)
-    length = float(np.sqrt(mesh.area / target))
     with watch("align"):
-        settings = AlignSettings(length, attempt.smoothing, attempt.cancel)
-        aligned = align_field(mesh, field, creases, settings, seam)
+        settings = AlignSettings(wish.length, attempt.smoothing, attempt.cancel)
+        aligned = align_field(wish.mesh, wish.field, creases, settings, wish.seam)
     tell("map", 0.15)
     with watch("map"):
         least: Floats | None = None
+        curved = wish.curving(creases)
         if curved > 0:
             bent = sizes_for_creases(aligned, curved)
             aligned, least = bent.aligned, bent.density
-        seamless = solve_seamless_map(aligned, size_weight=size_weight, least_density=least)
+        seamless = solve_seamless_map(aligned, size_weight=wish.size_weight, least_density=least)
     if not seamless.is_valid:
         raise ParametrizationError(
             f"{seamless.flips} triangles of the map stay folded after {seamless.solves} solves"
@@ -255,12 +279,12 @@ def _by_map(
     with watch("quantise"):
         tracing = trace(aligned, seamless)
         tmesh = build_tmesh(aligned, seamless, tracing)
-        layout = quantise(tmesh, target, seamless.area).layout
+        layout = quantise(tmesh, wish.target, seamless.area).layout
     tell("lay out", 0.7)
     with watch("lay out"):
         vertices = embed_layout(layout, aligned, seamless)
     quads = QuadMesh(vertices, layout.quads)
-    _require_topology(quads, mesh)
+    _require_topology(quads, wish.mesh)
     return _Mapped(quads, aligned, seamless, tracing, layout, attempt.name)
 
 

@@ -18,7 +18,7 @@ from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.quality import check_quads
 from vhquad.mesh.triangle import TriMesh
-from vhquad.quad.component import Progress, remesh_component
+from vhquad.quad.component import Component, Progress, remesh_component
 from vhquad.quad.parts import Part, UvMap, join_quads, join_uv
 from vhquad.quad.seamless_map import SIZE_WEIGHT
 from vhquad.quad.sizing import checked_density, wanted_sizes
@@ -264,16 +264,18 @@ def _remesh_parts(
         onto = surface if whole is surface.mesh else ClosestPoints(whole)
         parts.append(
             remesh_component(
-                part,
-                part_field,
-                own,
-                edge,
-                settings.crease,
-                target,
-                slack,
-                onto,
-                size_weight,
-                settings.adaptivity,
+                Component(
+                    mesh=part,
+                    field=part_field,
+                    surface=onto,
+                    target=target,
+                    slack=slack,
+                    creases=own,
+                    crease_angle=settings.crease,
+                    seam=edge,
+                    size_weight=size_weight,
+                    adaptivity=settings.adaptivity,
+                ),
                 with_uv,
                 tell,
             )
