@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vhquad.mesh.triangle import TriMesh
+from vhquad.quad.curves import CurveConstraints
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -106,3 +107,12 @@ def shaken(quads: Quads, rng: np.random.Generator, amount: float, held: Ints) ->
     move *= (rng.uniform(0, amount, len(v)) * shortest)[:, None]
     move[held] = 0.0
     return v + move
+
+
+def bound_to_rim(quads: Quads) -> tuple[TriMesh, Ints, CurveConstraints]:
+    """A disk as triangles, the vertices of its rim in order, and the rim as their curve."""
+    mesh = triangulated(quads)
+    rim = mesh.tail[mesh.boundary_loops[0]]
+    curve = np.full(mesh.n_vertices, -1)
+    curve[rim] = 0
+    return mesh, rim, CurveConstraints([mesh.vertices[rim]], [True], curve)

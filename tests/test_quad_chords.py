@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.quad_meshes import quad_disk, triangulated
+from tests.quad_meshes import bound_to_rim, quad_disk
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.quad.chords import Polyline, fit_chords
 from vhquad.quad.curves import CurveConstraints
@@ -87,11 +87,7 @@ def test_a_corner_between_straight_lines_is_taken() -> None:
 def test_a_disk_takes_its_rim_and_stays_good() -> None:
     quads = quad_disk(6, 6)
     v, q = quads
-    mesh = triangulated(quads)
-    rim = mesh.tail[mesh.boundary_loops[0]]
-    curve = np.full(len(v), -1)
-    curve[rim] = 0
-    curves = CurveConstraints([v[rim]], [True], curve)
+    mesh, rim, curves = bound_to_rim(quads)
     # Turned by a third of an edge, every rim vertex misses the kinks of the input's rim.
     arc = curves.locate(rim, v[rim])
     x = v.copy()

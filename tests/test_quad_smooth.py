@@ -8,6 +8,7 @@ import pytest
 from tests.map_stages import stages
 from tests.quad_meshes import (
     Quads,
+    bound_to_rim,
     cube_sphere,
     quad_disk,
     quad_grid,
@@ -133,11 +134,7 @@ def test_flat_grid_comes_back_exactly() -> None:
 def test_boundary_slides_on_its_circle() -> None:
     quads = quad_disk(6, 6)
     v, q = quads
-    mesh = triangulated(quads)
-    rim = mesh.tail[mesh.boundary_loops[0]]
-    curve = np.full(len(v), -1)
-    curve[rim] = 0
-    circle = CurveConstraints([v[rim]], [True], curve)
+    mesh, rim, circle = bound_to_rim(quads)
     rng = np.random.default_rng(0)
     x = shaken(quads, rng, 0.9, rim)
     arc = circle.locate(rim, v[rim])
