@@ -112,8 +112,8 @@ PRESETS: dict[str, ModelSettings] = {
     "paper": ModelSettings(
         channels=256, blocks=6, times=4, keep_input=False, dropout=0.5, head="paper", head_terms=0
     ),
-    # What models/default.safetensors was before two blocks were added: a quarter of the time a step,
-    # a third of the loss.
+    # What models/default.safetensors was before it got two blocks more: a quarter of the time a
+    # step, a third of the loss.
     "starter": ModelSettings(hidden_layers=1, in_channels=72, in_lines=6, features="local"),
 }
 
