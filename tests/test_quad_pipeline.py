@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -28,65 +26,16 @@ from tests.meshes import (
     tetrahedron,
     torus,
 )
-from vhquad.errors import ConfigError, FieldError, ParametrizationError
-from vhquad.field.align import align_field
+from tests.remesh_checks import check_valid, plain_field, run
+from vhquad.errors import ConfigError, FieldError
 from vhquad.field.cross import CrossField
 from vhquad.field.smooth import smoothest
 from vhquad.field.transport import to_vertices
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.quality import scaled_jacobians
 from vhquad.mesh.triangle import TriMesh
-from vhquad.quad import component
-from vhquad.quad.component import MAP, PAIRED
-from vhquad.quad.pipeline import RemeshResult, RemeshSettings, remesh_mesh
-from vhquad.quad.quantize import Quantisation, quantise
-from vhquad.quad.tmesh import TMesh
-
-
-def plain_field(mesh: TriMesh) -> CrossField:
-    """Nothing known: the smoothest field along the boundaries."""
-    return CrossField("faces", np.zeros(mesh.n_faces))
-
-
-def run(mesh: TriMesh, target: int = 200, field: CrossField | None = None) -> RemeshResult:
-    return remesh_mesh(mesh, field or plain_field(mesh), RemeshSettings(target_quads=target))
-
-
-def check_valid(mesh: TriMesh, result: RemeshResult) -> None:
-    quads, report = result.quads, result.report
-    # 1. a manifold of quads only, every component, the same topology
-    assert quads.is_manifold
-    assert len(quads.degenerate_quads) == 0
-    assert len(np.unique(quads.quads)) == quads.n_vertices
-    assert report.topology_kept
-    assert quads.n_components == mesh.n_components
-    assert quads.euler_characteristic == mesh.euler_characteristic
-    assert quads.n_boundary_loops == len(mesh.boundary_loops)
-    # 2. the rim on the rim
-    assert rim_distance(mesh, result) < 1e-6 * mesh.diagonal
-    # 3. the report counts what is there
-    assert report.made == quads.n_quads == sum(part.made for part in report.components)
-    assert len(report.components) == mesh.n_components
-    assert report.quality is not None
-    assert report.quality.boundary_loops == quads.n_boundary_loops
-    for part in report.components:
-        off = abs(part.made / part.target - 1)
-        assert off <= 0.1 or part.reason or abs(part.made - part.target) <= 0.005 * report.asked
-        assert part.reason if part.is_fallback else not part.reason or off > 0.09
-
-
-def rim_distance(mesh: TriMesh, result: RemeshResult) -> float:
-    """Largest distance of a boundary vertex to the boundary polyline of the input."""
-    rim = result.quads.vertices[result.quads.is_boundary_vertex]
-    border = np.flatnonzero(mesh.twin < 0)
-    if len(border) == 0:
-        assert len(rim) == 0
-        return 0.0
-    a, d = mesh.vertices[mesh.tail[border]], mesh.vertices[mesh.head[border]]
-    d = d - a
-    t = np.clip(np.einsum("pei,ei->pe", rim[:, None] - a[None], d) / (d * d).sum(axis=1), 0, 1)
-    off = np.linalg.norm(rim[:, None] - a[None] - t[..., None] * d[None], axis=2).min(axis=1)
-    return float(off.max())
+from vhquad.quad.component import MAP
+from vhquad.quad.pipeline import RemeshSettings, remesh_mesh
 
 
 @pytest.mark.parametrize("case", CLOSED + OPEN, ids=str)
@@ -306,64 +255,6 @@ def test_the_map_on_request() -> None:
     assert run(mesh).uv is None
 
 
-def test_a_field_without_a_map_falls_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    solve = component.solve_seamless_map
-    monkeypatch.setattr(
-        component, "solve_seamless_map", lambda *a, **k: replace(solve(*a, **k), flips=3, solves=9)
-    )
-    mesh = merge(icosphere(2), moved(grid(), (3.0, 0, 0)))
-    result = run(mesh, 200)
-    assert result.quads.is_manifold
-    assert result.report.topology_kept
-    assert len(result.report.fallbacks) == 2
-    for part in result.report.components:
-        assert part.method == "paired triangles"
-        assert "3 triangles of the map stay folded after 9 solves" in part.reason
-    assert any("paired triangles" in line for line in result.report.shortfalls())
-
-
-@pytest.mark.parametrize(
-    ("factors", "chosen"),
-    [((2, 3, 4, 5), 0), ((2.1, 2, 2, 2), 0), ((3, 2, 4, 4), 1), ((5, 4, 3, 2), 3)],
-)
-def test_a_count_that_nothing_meets_is_explained(
-    monkeypatch: pytest.MonkeyPatch, factors: tuple[float, ...], chosen: int
-) -> None:
-    """The first attempt that makes about the nearest count is taken, and the report says so."""
-    made: list[int] = []
-
-    def more(tmesh: TMesh, target: float, area: float) -> Quantisation:
-        found = quantise(tmesh, factors[len(made)] * target, area)
-        made.append(found.n_quads)
-        return found
-
-    monkeypatch.setattr(component, "quantise", more)
-    mesh = tetrahedron()
-    result = run(mesh, 60)
-    check_valid(mesh, result)
-    assert len(made) == 4
-    part = result.report.components[0]
-    assert part.made == made[chosen]
-    assert (part.method == MAP) == (chosen == 0)
-    for count in made:
-        assert f"{count} quads where 60 were asked for" in part.reason
-    lines = result.report.shortfalls()
-    assert any("count missed, because" in line for line in lines) == (chosen == 0)
-
-
-def test_a_layout_of_another_topology_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    def with_a_hole(tmesh: TMesh, target: float, area: float) -> Quantisation:
-        made = quantise(tmesh, target, area)
-        return replace(made, layout=replace(made.layout, quads=made.layout.quads[1:]))
-
-    monkeypatch.setattr(component, "quantise", with_a_hole)
-    result = run(icosphere(2), 100)
-    check_valid(icosphere(2), result)
-    part = result.report.components[0]
-    assert part.method == "paired triangles"
-    assert "instead of (1, 2, 0)" in part.reason
-
-
 def test_what_does_not_fit_is_refused() -> None:
     mesh = tetrahedron()
     with pytest.raises(FieldError, match="3 crosses, the mesh 4 faces"):
@@ -380,25 +271,3 @@ def test_what_does_not_fit_is_refused() -> None:
     ):
         with pytest.raises(ConfigError, match="--"):
             RemeshSettings(**wrong)  # type: ignore[arg-type]
-
-
-def test_every_further_attempt_leaves_fewer_singularities(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pairs are cancelled within half an edge at first, then within one, then within two."""
-    seen: list[tuple[float, int]] = []
-
-    def watched(mesh: TriMesh, field: CrossField, creases, settings, seam):  # type: ignore[no-untyped-def]
-        aligned = align_field(mesh, field, creases, settings, seam)
-        seen.append((settings.cancel, sum(aligned.report.singularities.values())))
-        return aligned
-
-    def never(tmesh: TMesh, target: float, area: float) -> Quantisation:
-        raise ParametrizationError("not at this density")
-
-    monkeypatch.setattr(component, "align_field", watched)
-    monkeypatch.setattr(component, "quantise", never)
-    mesh = icosphere(3)
-    result = run(mesh, 60, CrossField("faces", noisy(mesh, 1.0, np.random.default_rng(0))))
-    assert result.report.components[0].method == PAIRED
-    assert [cancel for cancel, _ in seen] == [0.5, 1.0, 2.0]
-    counts = [count for _, count in seen]
-    assert counts[0] > counts[1] >= counts[2] >= 8  # a sphere has eight at least
