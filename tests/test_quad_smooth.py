@@ -21,20 +21,19 @@ from vhquad.mesh.closest import ClosestPoints, Hits
 from vhquad.mesh.quad import QuadMesh
 from vhquad.quad import descent
 from vhquad.quad.aspects import smoothed_aspects
+from vhquad.quad.corners import ahead, behind, cross_rows
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.distortion import (
     corner_jacobians,
-    cross,
     distortion,
-    last_corner,
     misalignment,
-    next_corner,
     quad_normals,
 )
 from vhquad.quad.embed import embed_layout
 from vhquad.quad.guide import FieldGuide
 from vhquad.quad.sliding import folded_quads
 from vhquad.quad.smooth import smooth_quads, smoothed_sizes
+from vhquad.quad.vectors import cross
 
 NOBODY = np.zeros(0, dtype=np.int64)
 
@@ -254,8 +253,10 @@ def test_cross_products_and_neighbouring_corners(rng: np.random.Generator) -> No
     a, b = rng.normal(size=(2, 7, 4, 3))
     np.testing.assert_array_equal(cross(a, b), np.cross(a, b))
     np.testing.assert_array_equal(cross(a, b[:, :1]), np.cross(a, b[:, :1]))  # broadcast
-    np.testing.assert_array_equal(next_corner(a), np.roll(a, -1, axis=1))
-    np.testing.assert_array_equal(last_corner(a[..., 0]), np.roll(a[..., 0], 1, axis=1))
+    rows = cross_rows(a.transpose(2, 1, 0), b.transpose(2, 1, 0))
+    np.testing.assert_array_equal(rows.transpose(2, 1, 0), np.cross(a, b))
+    np.testing.assert_array_equal(ahead(rows), np.roll(rows, -1, axis=1))
+    np.testing.assert_array_equal(behind(rows[0]), np.roll(rows[0], 1, axis=0))
 
 
 def test_edges_off_a_direction_cost_their_share_across() -> None:
@@ -300,7 +301,7 @@ def test_a_guided_polish_keeps_to_the_field(rng: np.random.Generator) -> None:
 
     def off(x: np.ndarray) -> float:
         edge = quad_edges(x, quads.quads)[:, 0]
-        along = guide.along(x[quads.quads].mean(axis=1), edge)
+        along = guide.along(guide.faces(x[quads.quads].mean(axis=1)), edge)
         cosine = (along * edge).sum(axis=1) / np.linalg.norm(edge, axis=1)
         return float(np.degrees(np.arccos(np.clip(cosine, -1, 1))).mean())
 
@@ -316,7 +317,8 @@ def test_the_guide_gives_the_nearest_arm() -> None:
     centres = mesh.vertices[mesh.faces].mean(axis=1)
     for angle in np.radians([0, 30, 100, 200, 300]):
         near = np.tile([np.cos(angle), np.sin(angle), 0.0], (len(centres), 1))
-        arm = FieldGuide(s.aligned).along(centres, near)
+        guide = FieldGuide(s.aligned)
+        arm = guide.along(guide.faces(centres), near)
         turn = np.round(angle / (np.pi / 2)) * np.pi / 2  # the field runs along the axes
         np.testing.assert_allclose(
             arm, np.tile([np.cos(turn), np.sin(turn), 0], (len(arm), 1)), atol=1e-9

@@ -47,7 +47,7 @@ def grow_creases(mesh: TriMesh, pairs: Ints, degrees: float) -> Ints:
     sharp = sharp_edges(mesh, degrees)
     if len(pairs) == 0 or len(sharp) == 0:
         return pairs
-    if not are_mostly_creases(mesh, pairs, degrees):
+    if not are_mostly_creases(mesh, pairs, sharp):
         return pairs
     around = side_angles(mesh, sharp)
     bends = (around > LEAST_AROUND * np.radians(degrees)) & (
@@ -63,9 +63,18 @@ def grow_creases(mesh: TriMesh, pairs: Ints, degrees: float) -> Ints:
     return np.concatenate([pairs, others[np.isin(piece[others[:, 0]], piece[pairs])]])
 
 
-def are_mostly_creases(mesh: TriMesh, pairs: Ints, degrees: float) -> bool:
-    """Whether most of what is sharp on a mesh are creases: it was designed with them."""
-    return _length(mesh, pairs) >= MOSTLY * _length(mesh, mesh.edges[sharp_edges(mesh, degrees)])
+def are_mostly_creases(mesh: TriMesh, pairs: Ints, sharp: Ints) -> bool:
+    """Whether most of what is sharp on a mesh are creases: it was designed with them.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+    pairs : (k, 2) int64
+        Crease edges as vertex pairs.
+    sharp : (j,) int64
+        Sharp edges, as :func:`vhquad.field.features.sharp_edges` finds them.
+    """
+    return _length(mesh, pairs) >= MOSTLY * _length(mesh, mesh.edges[sharp])
 
 
 def _length(mesh: TriMesh, pairs: Ints) -> float:

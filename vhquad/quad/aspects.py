@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from vhquad.quad.distortion import next_corner
+from vhquad.quad.corners import ahead, corners, dot
 
 __all__ = ["smoothed_aspects"]
 
@@ -20,7 +20,7 @@ ROUNDS = 2  # of averaging: rounding to whole quads makes neighbouring rows unev
 MOST = 2.0  # longest quad to ask for, of its width
 FLAT = 1e-9  # of the longest edge: shorter ones tell no aspect
 
-_SIGN = np.array([1.0, -1.0, 1.0, -1.0])
+_SIGN = np.array([[1.0], [-1.0], [1.0], [-1.0]])  # edges 1 and 3 run across: there length is width
 
 
 def smoothed_aspects(vertices: Floats, quads: Ints, rounds: int = ROUNDS) -> Floats:
@@ -42,15 +42,17 @@ def smoothed_aspects(vertices: Floats, quads: Ints, rounds: int = ROUNDS) -> Flo
     (k,) float64
         Between 1/2 and 2.
     """
-    p = vertices[quads]
-    length = np.linalg.norm(next_corner(p) - p, axis=2)
-    length = np.maximum(length[:, :2] + length[:, 2:], FLAT * max(float(length.max()), 1e-300))
-    value = np.clip(np.log(length[:, 0] / length[:, 1]), -np.log(MOST), np.log(MOST))
-    ends = np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    _, edge = np.unique(ends[:, 0] * len(vertices) + ends[:, 1], return_inverse=True)
-    edge = edge.reshape(-1)
-    count = np.bincount(edge)
+    p = corners(vertices, quads)
+    edge = ahead(p) - p
+    length = np.sqrt(dot(edge, edge))
+    length = np.maximum(length[:2] + length[2:], FLAT * max(float(length.max()), 1e-300))
+    value = np.clip(np.log(length[0] / length[1]), -np.log(MOST), np.log(MOST))
+    tail = quads.T
+    ends = np.sort(np.stack([tail, np.roll(tail, -1, axis=0)]).reshape(2, -1), axis=0)
+    _, shared = np.unique(ends[0] * len(vertices) + ends[1], return_inverse=True)
+    shared = shared.reshape(-1)
+    count = np.bincount(shared)
     for _ in range(rounds):
-        along = np.bincount(edge, (value[:, None] * _SIGN).reshape(-1)) / count
-        value = (along[edge].reshape(-1, 4) * _SIGN).mean(axis=1)
+        along = np.bincount(shared, (value * _SIGN).reshape(-1)) / count
+        value = (along[shared].reshape(4, -1) * _SIGN).mean(axis=0)
     return np.asarray(np.exp(value))

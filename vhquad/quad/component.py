@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from vhquad.errors import FieldError, ParametrizationError
 from vhquad.field.align import AlignedField, AlignReport, AlignSettings, align_field
 from vhquad.field.creases import TOGETHER, creases_for_quads
 from vhquad.field.cross import CrossField
+from vhquad.field.features import sharp_edges
 from vhquad.field.grow import are_mostly_creases
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.quad import QuadMesh
@@ -175,11 +177,16 @@ class Component:
         ones would take the quads that shapes need.
         """
         if self.creases is None and (
-            self.crease_angle is None
-            or not are_mostly_creases(self.mesh, creases, self.crease_angle)
+            self.crease_angle is None or not are_mostly_creases(self.mesh, creases, self._sharp)
         ):
             return 0.0
         return self.adaptivity
+
+    @cached_property
+    def _sharp(self) -> Ints:
+        """Edges sharper than the crease angle, if there is one; found once for all attempts."""
+        none = np.zeros(0, dtype=np.int64)
+        return none if self.crease_angle is None else sharp_edges(self.mesh, self.crease_angle)
 
 
 def remesh_component(wish: Component, with_uv: bool, tell: Progress) -> Part:
@@ -299,7 +306,7 @@ def _polished(mapped: _Mapped, surface: ClosestPoints, watch: Watch, tell: Progr
         def polish(held: Bools) -> NDArray[np.float64]:
             return smooth_quads(quads.vertices, quads.quads, surface, held, curves, guide=guide)
 
-        moved = polished_onto_limbs(Covering.of(quads, surface), fixed, polish)
+        moved = polished_onto_limbs(Covering(quads, surface), fixed, polish)
     with watch("unfold"):
         moved = lifted(moved, quads.quads, surface, fixed | (curves.curve >= 0))
     return QuadMesh(moved, quads.quads)

@@ -14,15 +14,8 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, diags_array
 
 from vhquad.geometry.sparse import PositiveFactor
-from vhquad.quad.distortion import (
-    SHARP,
-    barrier_width,
-    cross,
-    last_corner,
-    next_corner,
-    shapes,
-    unit,
-)
+from vhquad.quad.corners import ahead, behind, corners, cross_rows, dot, gathered, shapes, unit_rows
+from vhquad.quad.distortion import SHARP, barrier_width
 from vhquad.quad.sliding import (
     GUIDANCE,
     Problem,
@@ -52,25 +45,22 @@ def spread(problem: Problem, state: State, factor: PositiveFactor, iterations: i
     """Move vertices so that quads come near their own best-fitting squares; the last state."""
     quads = problem.quads
     low, high = SQUARE_RANGE[0] * problem.size, SQUARE_RANGE[1] * problem.size
-    corners = quads.reshape(-1)
-    shape = shapes(problem.aspect, len(quads)).T[..., None]
+    shape, area = shapes(problem.aspect, len(quads)), problem.size**2
+    guidance = GUIDANCE * problem.along.T
     for _ in range(iterations):
-        n = reference_normals(problem, state.normals)
-        p = state.vertices[quads]
-        edge = (next_corner(p) - p) / shape
+        n = reference_normals(problem, state.normals).T
+        p = corners(state.vertices, quads)
+        edge = (ahead(p) - p) / shape
         # Edges of a square: d, n x d, -d, -(n x d); the least squares fit of d, in the plane.
-        d = edge[:, 0] - edge[:, 2] + cross(edge[:, 1] - edge[:, 3], n)
-        d -= np.einsum("ki,ki->k", d, n)[:, None] * n
-        side = np.clip(0.25 * np.sqrt(np.einsum("ki,ki->k", d, d)), low, high)
-        d = side[:, None] * unit(unit(d) + GUIDANCE * problem.along)
-        turned = cross(n, d)
+        d = edge[:, 0] - edge[:, 2] + cross_rows(edge[:, 1] - edge[:, 3], n)
+        d -= dot(d, n) * n
+        side = np.clip(0.25 * np.sqrt(dot(d, d)), low, high)
+        d = side * unit_rows(unit_rows(d) + guidance)
+        turned = cross_rows(n, d)
         wanted = np.stack([d, turned, -d, -turned], axis=1)
-        pull = (wanted - edge) / ((problem.size**2)[:, None, None] * shape)
-        force = last_corner(pull) - pull
-        total = [
-            np.bincount(corners, force[..., i].reshape(-1), len(problem.fixed)) for i in range(3)
-        ]
-        force = tangential(problem, state, np.stack(total, axis=1))
+        pull = (wanted - edge) / (area * shape)
+        force = gathered(behind(pull) - pull, quads, len(problem.fixed))
+        force = tangential(problem, state, force)
         move = tangential(problem, state, _solve(problem, factor, force))
         length = _longest(problem, move)
         state = place(problem, state.vertices + min(1.0, 1.0 / max(length, 1e-300)) * move, state)

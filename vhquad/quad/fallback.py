@@ -10,9 +10,9 @@ from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.triangle import TriMesh, next_halfedge, prev_halfedge
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.decimate import decimate
-from vhquad.quad.distortion import cross, unit
 from vhquad.quad.ragged import PolygonMesh, midpoint_split
 from vhquad.quad.smooth import smooth_quads
+from vhquad.quad.vectors import cross, unit
 
 __all__ = ["boundary_curves", "pair_triangles", "triangles_to_quads"]
 

@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 from vhquad.field.align import AlignedField
 from vhquad.geometry.frames import face_axes, to_3d
 from vhquad.mesh.closest import ClosestPoints
-from vhquad.quad.distortion import cross, unit
+from vhquad.quad.vectors import cross, unit
 
 __all__ = ["FieldGuide"]
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
 class FieldGuide:
@@ -29,15 +30,18 @@ class FieldGuide:
         self._normal = aligned.mesh.face_normals
         self._trust = aligned.trust
 
-    def trust(self, points: Floats) -> Floats:
-        """Trust in the cross at each point, in [0, 1]; (q,)."""
-        return np.asarray(self._trust[self._surface.query(points).face])
+    def faces(self, points: Floats) -> Ints:
+        """The face of the surface nearest to each point; (q,)."""
+        return self._surface.query(points).face
 
-    def along(self, points: Floats, near: Floats) -> Floats:
-        """The arm of the cross at each point that is nearest to a direction; (q, 3), unit."""
-        face = self._surface.query(points).face
-        first = self._axis[face]
-        second = cross(self._normal[face], first)
+    def trust(self, faces: Ints) -> Floats:
+        """Trust in the crosses of faces, in [0, 1]; (q,)."""
+        return np.asarray(self._trust[faces])
+
+    def along(self, faces: Ints, near: Floats) -> Floats:
+        """The arm of the cross of each face that is nearest to a direction; (q, 3), unit."""
+        first = self._axis[faces]
+        second = cross(self._normal[faces], first)
         x = np.einsum("qi,qi->q", first, near)
         y = np.einsum("qi,qi->q", second, near)
         arm = np.where((np.abs(x) >= np.abs(y))[:, None], first, second)

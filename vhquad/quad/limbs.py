@@ -39,28 +39,29 @@ class Covering:
     layout : QuadMesh
         Quads that cover all that can be covered.
     surface : ClosestPoints
-    length : float
-        Mean edge length of the quads.
-    least : (n,) float64
-        Distance of each vertex of the surface from the layout.
     """
 
     layout: QuadMesh
     surface: ClosestPoints
-    length: float
-    least: Floats
 
-    @classmethod
-    def of(cls, layout: QuadMesh, surface: ClosestPoints) -> Covering:
-        """The covering by a layout itself."""
-        length = float(np.sqrt(surface.mesh.area / layout.n_quads))
-        return cls(layout, surface, length, _distances(layout, layout.vertices, surface))
+    @property
+    def length(self) -> float:
+        """Mean edge length of the quads."""
+        return float(np.sqrt(self.surface.mesh.area / self.layout.n_quads))
 
     def bare(self, vertices: Floats) -> Ints:
         """Vertices of the surface that the quads have left, farthest first."""
-        far = _distances(self.layout, vertices, self.surface)
-        bare = np.flatnonzero((far > BARE * self.length) & (far > FARTHER * self.least))
+        points = self.surface.mesh.vertices
+        far = self._quads(vertices).distance(points)
+        bare = np.flatnonzero(far > BARE * self.length)
+        if len(bare):  # seldom: only then does it matter how far off the layout was
+            least = self._quads(self.layout.vertices).distance(points[bare])
+            bare = bare[far[bare] > FARTHER * least]
         return bare[np.argsort(-far[bare], kind="stable")]
+
+    def _quads(self, vertices: Floats) -> ClosestPoints:
+        """Quads with the corners of the layout and other positions."""
+        return ClosestPoints(TriMesh(vertices, self.layout.triangles()))
 
     def keepers(self, bare: Ints) -> Ints:
         """Vertices of the layout nearest to some bare places that are apart from each other."""
@@ -100,9 +101,3 @@ def polished_onto_limbs(
         held = more
         moved = polish(held)
     return moved
-
-
-def _distances(layout: QuadMesh, vertices: Floats, surface: ClosestPoints) -> Floats:
-    """From each vertex of a surface to quads with the corners of a layout; (n,)."""
-    own = ClosestPoints(TriMesh(vertices, layout.triangles()))
-    return own.distance(surface.mesh.vertices)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vhquad.mesh.closest import ClosestPoints, Hits
+from vhquad.quad.corners import shapes
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.distortion import (
     SHARP,
@@ -16,9 +17,8 @@ from vhquad.quad.distortion import (
     distortion,
     misalignment,
     quad_normals,
-    shapes,
-    unit,
 )
+from vhquad.quad.vectors import unit
 
 __all__ = [
     "GUIDANCE",

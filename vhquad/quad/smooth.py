@@ -20,10 +20,11 @@ from vhquad.mesh.rings import separate_parts, within_rings
 from vhquad.quad.aspects import smoothed_aspects
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.descent import better, descend, laplacian_factor, spread
-from vhquad.quad.distortion import corner_jacobians, cross
+from vhquad.quad.distortion import corner_jacobians
 from vhquad.quad.guide import FieldGuide
 from vhquad.quad.settle import settle_on_curves
 from vhquad.quad.sliding import Problem, State, make_problem, measure, place
+from vhquad.quad.vectors import cross
 
 __all__ = ["smooth_quads", "smoothed_sizes"]
 
@@ -102,16 +103,21 @@ def smooth_quads(
         size = np.array(target_edge, dtype=np.float64)[q].mean(axis=1)
         size *= np.sqrt(surface.mesh.area / (size**2).sum())
     hold[np.setdiff1d(np.arange(len(x)), q)] = True
-    aspect = np.ones(len(q))
+    aspect, under = np.ones(len(q)), np.zeros(0, dtype=np.int64)
     if guide is not None:
-        aspect = smoothed_aspects(x, q) ** guide.trust(x[q].mean(axis=1))
+        under = guide.faces(x[q].mean(axis=1))
+        aspect = smoothed_aspects(x, q) ** guide.trust(under)
     problem = make_problem(q, surface, bound, hold, size, aspect=aspect)
-    problem, start = _guided(problem, place(problem, x, None), guide)
+    start = place(problem, x, None)
+    if guide is not None:
+        problem, start = _guided(problem, start, guide, under)
     if hold.all() or iterations <= 0:
         return start.vertices
     factor = laplacian_factor(problem)
     state = descend(problem, start, factor, iterations // 2)
-    problem, state = _guided(problem, state, guide)
+    if guide is not None:
+        centres = state.vertices[q].mean(axis=1)
+        problem, state = _guided(problem, state, guide, guide.faces(centres))
     state = _mended(problem, descend(problem, state, factor, iterations // 2), POOR)
     if state.folded.any():
         # Spreading opens what is crowded; not at first, since it drags quads out of thin parts.
@@ -138,12 +144,12 @@ def smoothed_sizes(vertices: Floats, quads: Ints, area: float, rounds: int = 8) 
     return np.asarray(np.sqrt(value * (area / value.sum())))
 
 
-def _guided(problem: Problem, state: State, guide: FieldGuide | None) -> tuple[Problem, State]:
-    """The problem with the directions of the field where the quads are now, and the state in it."""
-    if guide is None:
-        return problem, state
+def _guided(
+    problem: Problem, state: State, guide: FieldGuide, under: Ints
+) -> tuple[Problem, State]:
+    """The problem with the directions of the field at its faces under the quads, and its state."""
     p = state.vertices[problem.quads]
-    along = guide.along(p.mean(axis=1), p[:, 1] - p[:, 0] + p[:, 2] - p[:, 3])
+    along = guide.along(under, p[:, 1] - p[:, 0] + p[:, 2] - p[:, 3])
     problem = replace(problem, along=along)
     return problem, measure(problem, state.vertices, state.arc, state.normals, state.face)
 
