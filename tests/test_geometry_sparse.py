@@ -42,3 +42,15 @@ def test_inverse_of_a_shifted_laplacian(
     found = PositiveFactor(matrix.astype(single)).solve(right.astype(single))
     assert found.dtype == single
     np.testing.assert_allclose(found, expected, atol=1e-3)
+
+
+def test_an_indefinite_matrix_in_single_precision(rng: np.random.Generator) -> None:
+    """With rows changing places it is as good as a definite one."""
+    mesh = icosphere(3)
+    laplacian = cotan_laplacian(intrinsic_delaunay(mesh, build_frames(mesh)))
+    matrix = csr_matrix(laplacian - 0.5 * diags_array(np.ones(mesh.n_vertices)))
+    right = rng.normal(size=(mesh.n_vertices, 3))
+    expected = np.linalg.solve(matrix.toarray(), right)
+    factor = PositiveFactor(matrix.astype(np.float32), definite=False)
+    found = factor.solve(right.astype(np.float32))
+    assert np.linalg.norm(found - expected) < 1e-4 * np.linalg.norm(expected)

@@ -25,6 +25,10 @@ class PositiveFactor:
     like : PositiveFactor, optional
         Of a matrix with about the same entries: its elimination order is taken over, which is a
         third of the work.
+    definite : bool
+        False for a matrix with negative eigenvalues: rows then change places for the sake of
+        pivots. Without, single precision would lose three digits; few change, so the factor stays
+        as sparse.
 
     Attributes
     ----------
@@ -32,7 +36,9 @@ class PositiveFactor:
         Row i of the factor is row ``order[i]`` of the matrix.
     """
 
-    def __init__(self, matrix: Any, like: PositiveFactor | None = None) -> None:
+    def __init__(
+        self, matrix: Any, like: PositiveFactor | None = None, definite: bool = True
+    ) -> None:
         if like is None:
             self.order = np.random.default_rng(0).permutation(matrix.shape[0])
         else:
@@ -42,7 +48,7 @@ class PositiveFactor:
         self._factor: Any = splu(
             csc_matrix(shuffled),
             permc_spec="MMD_AT_PLUS_A" if like is None else "NATURAL",
-            diag_pivot_thresh=0.0,
+            diag_pivot_thresh=0.0 if definite else 1.0,
             options={"SymmetricMode": True},
         )
 
