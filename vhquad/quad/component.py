@@ -32,7 +32,7 @@ from vhquad.quad.fallback import triangles_to_quads
 from vhquad.quad.guide import FieldGuide
 from vhquad.quad.integer_map import integer_map
 from vhquad.quad.layout import Layout
-from vhquad.quad.lift import lifted, wrong_quads
+from vhquad.quad.lift import lifted
 from vhquad.quad.limbs import Covering, polished_onto_limbs
 from vhquad.quad.motorcycle import Tracing, trace
 from vhquad.quad.parts import Part, UvMap
@@ -203,8 +203,7 @@ def remesh_component(wish: Component, with_uv: bool, tell: Progress) -> Part:
 
     def good_enough(mapped: _Mapped) -> bool:
         """Polish an attempt; whether it is to be the last."""
-        quads = _polished(mapped, surface, watch, tell)
-        wrong = int(wrong_quads(quads.vertices, quads.quads, surface).sum())
+        quads, wrong = _polished(mapped, surface, watch, tell)
         done.append((wrong, mapped, quads))
         if wrong > 0:
             reasons.append(f"{wrong} quads stay folded")
@@ -295,8 +294,13 @@ def _by_map(
     return _Mapped(quads, aligned, seamless, tracing, layout, attempt.name)
 
 
-def _polished(mapped: _Mapped, surface: ClosestPoints, watch: Watch, tell: Progress) -> QuadMesh:
-    """The quads with their vertices moved to even shapes, on the surface but at the last folds."""
+def _polished(
+    mapped: _Mapped, surface: ClosestPoints, watch: Watch, tell: Progress
+) -> tuple[QuadMesh, int]:
+    """The quads with their vertices moved to even shapes, on the surface but at the last folds.
+
+    And how many stay folded.
+    """
     tell("polish", 0.75)
     quads = mapped.quads
     with watch("polish"):
@@ -308,8 +312,8 @@ def _polished(mapped: _Mapped, surface: ClosestPoints, watch: Watch, tell: Progr
 
         moved = polished_onto_limbs(Covering(quads, surface), fixed, polish)
     with watch("unfold"):
-        moved = lifted(moved, quads.quads, surface, fixed | (curves.curve >= 0))
-    return QuadMesh(moved, quads.quads)
+        moved, wrong = lifted(moved, quads.quads, surface, fixed | (curves.curve >= 0))
+    return QuadMesh(moved, quads.quads), int(wrong.sum())
 
 
 def _require_topology(quads: QuadMesh, mesh: TriMesh) -> None:

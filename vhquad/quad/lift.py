@@ -59,7 +59,9 @@ def wrong_quads(vertices: Floats, quads: Ints, surface: ClosestPoints) -> Bools:
     return wrong
 
 
-def lifted(vertices: Floats, quads: Ints, surface: ClosestPoints, held: Bools) -> Floats:
+def lifted(
+    vertices: Floats, quads: Ints, surface: ClosestPoints, held: Bools
+) -> tuple[Floats, Bools]:
     """Vertices with fewer wrong quads, or as they were; those of patches leave the surface.
 
     Parameters
@@ -73,12 +75,13 @@ def lifted(vertices: Floats, quads: Ints, surface: ClosestPoints, held: Bools) -
 
     Returns
     -------
-    (n, 3) float64
+    vertices : (n, 3) float64
+    wrong : (k,) bool
+        The quads that stay wrong.
     """
-    x = _without_wrong(vertices, quads, surface, held)
-    wrong = wrong_quads(x, quads, surface)
+    x, wrong = _without_wrong(vertices, quads, surface, held)
     if not (wrong.any() and held.any()):
-        return x
+        return x, wrong
     let_go = np.zeros(len(x), dtype=bool)
     let_go[quads[wrong]] = True
     let_go[rim_vertices(quads)] = False
@@ -92,8 +95,13 @@ def rim_vertices(quads: Ints) -> Ints:
     return np.unique(edges[count == 1])
 
 
-def _without_wrong(x: Floats, quads: Ints, surface: ClosestPoints, held: Bools) -> Floats:
-    """Patches around wrong quads laid out anew, drawn less to the surface and wider each time."""
+def _without_wrong(
+    x: Floats, quads: Ints, surface: ClosestPoints, held: Bools
+) -> tuple[Floats, Bools]:
+    """Patches around wrong quads laid out anew, drawn less to the surface and wider each time.
+
+    And which quads are wrong still.
+    """
     wrong = wrong_quads(x, quads, surface)
     for pull, rings in TRIES:
         if not wrong.any():
@@ -101,7 +109,7 @@ def _without_wrong(x: Floats, quads: Ints, surface: ClosestPoints, held: Bools) 
         for inside in separate_parts(quads, within_rings(quads, wrong, rings)):  # few
             x = _relaid(x, quads, inside, surface, held, pull)
         wrong = wrong_quads(x, quads, surface)
-    return x
+    return x, wrong
 
 
 @dataclass(frozen=True, eq=False)
