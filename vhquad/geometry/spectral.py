@@ -33,7 +33,7 @@ _BELOW = -0.1  # where the matrix must stay definite
 _ROUNDING = 1e-2  # of an eigenvalue 0
 _BLOCK = 8
 _SKEW = 1e-4  # of the Ritz vectors, that a correction of second order still mends
-_RESIDUAL = 1e-4  # of the inverse's Ritz pairs, relative, at which the iteration stops
+_RESIDUAL = 2e-4  # of the inverse's Ritz pairs, relative, at which the iteration stops
 _DISAGREEMENT = 1e-3  # with the Rayleigh quotients in double, in units of the k-th eigenvalue
 _SINGLE_UP_TO = 1e7  # largest diagonal entry, in that unit, that single precision may see
 
