@@ -27,7 +27,7 @@ Bools = NDArray[np.bool_]
 BARE = 1.25  # mean edge lengths between a place of the surface and quads that have left it bare
 FARTHER = 1.5  # than the layout, at least: what that does not reach, no polish can
 APART = 2.0  # mean edge lengths between places looked after in one round
-ROUNDS = 5
+ROUNDS = 5  # one is enough as a rule; each takes another polish, so a hopeless limb must end it
 
 
 @dataclass(frozen=True, eq=False)
