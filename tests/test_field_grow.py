@@ -7,7 +7,7 @@ import numpy as np
 from tests.meshes import cube, icosphere
 from tests.test_field_sharpness import folded
 from vhquad.field.features import find_creases, sharp_edges
-from vhquad.field.grow import grow_creases
+from vhquad.field.grow import grow_creases, with_steps
 from vhquad.field.sharpness import side_angles
 from vhquad.mesh.triangle import TriMesh
 
@@ -77,3 +77,14 @@ def test_noise_does_not_join() -> None:
 
 def test_nothing_grows_from_nothing() -> None:
     assert grow_creases(cube(3), np.zeros((0, 2), np.int64), 40.0).shape == (0, 2)
+
+
+def test_long_steps_of_a_designed_part_are_kept() -> None:
+    """Three steps of 50 degrees, each 0.7 long, beside a cube; on their own they stay out."""
+    mesh = folded(3, np.radians(150), n=24)
+    steps = edges_of(mesh.edges[sharp_edges(mesh, 40.0)])
+    both, others = beside_a_cube(mesh)
+    assert edges_of(with_steps(both, others, 40.0, 0.69)) == steps | edges_of(others)
+    assert edges_of(with_steps(both, others, 40.0, 0.71)) == edges_of(others)
+    one = mesh.edges[sharp_edges(mesh, 40.0)][:1]
+    assert edges_of(with_steps(mesh, one, 40.0, 0.1)) == edges_of(one)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from vhquad.field.bridge import bridge_gaps
 from vhquad.field.features import find_creases
-from vhquad.field.grow import grow_creases
+from vhquad.field.grow import grow_creases, with_steps
 from vhquad.field.prune import prune_branches
 from vhquad.mesh.triangle import TriMesh
 
@@ -43,5 +43,6 @@ def creases_for_quads(
     """
     found = find_creases(mesh, degrees, together * edge_length)
     grown = grow_creases(mesh, found, degrees)
-    joined = bridge_gaps(mesh, grown, GAP * edge_length)
+    stepped = with_steps(mesh, grown, degrees, together * edge_length)
+    joined = bridge_gaps(mesh, stepped, GAP * edge_length)
     return prune_branches(mesh, joined, LOOSE * edge_length)

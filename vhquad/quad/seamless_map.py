@@ -40,7 +40,7 @@ DOUBTED_WEIGHT = 0.1  # the same where it is not
 TURN_POWER = 3  # where the field is sure, sizes count by so high a power of how the surface turns
 FEW_FOLDS = 50  # that are worth unfolding by themselves
 RINGS = 4  # of triangles around them
-PULLING_SOLVES = 2  # to find out which creases need pulling
+PULLING_SOLVES = 4  # to find out which creases need pulling, and how hard
 UNITS_PER_EDGE = 1 << 20
 """Integer units in a mean mesh edge: fine enough for any triangle, and products stay in int64."""
 
@@ -189,6 +189,7 @@ class _Problem:
         self.wedge = space.wedge
         size = np.ones(mesh.n_faces) if aligned.size is None else aligned.size
         self.stretch = 1.0 / size
+        self.wanted = float((mesh.face_areas / size**2).sum())  # area of the map
         local = _local_corners(mesh)
         # d/dz-bar and d/dz of the map in the face's frame come from these gradients.
         opposite = np.roll(local, 1, axis=1) - np.roll(local, -1, axis=1)
@@ -244,12 +245,22 @@ class _Problem:
         return np.asarray(factor.solve(np.asarray(self.transpose @ right)))
 
     def pull_creases(self, weight: Floats) -> None:
-        """Pull from now on where the map has too few quads along creases."""
+        """Pull from now on where the map has too few quads along creases.
+
+        Pulls make the map larger, and where it is scaled down to the count asked for creases lose
+        again what they gained; so the sizes of the rest grow as the map does.
+        """
         if self.pulls is None:
             return
         for _ in range(PULLING_SOLVES):
-            if not self.pulls.tighten(np.asarray(self.basis @ self.solve(weight))):
+            unknowns = self.solve(weight)
+            if not self.pulls.tighten(np.asarray(self.basis @ unknowns)):
                 break
+            z = self.corners(unknowns)
+            a, b = z[:, 1] - z[:, 0], z[:, 2] - z[:, 0]
+            growth = np.sqrt(max(0.5 * float((a.conj() * b).imag.sum()) / self.wanted, 1e-3))
+            self.stretch = self.stretch / growth
+            self.target = self.target / growth
 
     def corners(self, unknowns: Floats) -> NDArray[np.complex128]:
         """Chart coordinates of the corners; (m, 3) complex."""
