@@ -105,29 +105,3 @@ def test_what_does_not_fit_is_refused() -> None:
         align_field(mesh, CrossField("vertices", np.ones(80)))
     with pytest.raises(ConfigError, match="edge_length"):
         AlignSettings(edge_length=0.0)
-
-
-def test_of_a_long_crease_only_the_crowded_end_goes() -> None:
-    """Two creases of length 4 meet under 10 degrees: no quad fits between them at the meeting."""
-    turn = np.concatenate([[0.0, 10.0], np.arange(40.0, 360.0, 30.0)])
-    ring = np.exp(1j * np.radians(turn))
-    rim = np.concatenate([4 * ring, 6 * ring])
-    points = np.concatenate([[0.0], rim])
-    k = len(ring)
-    i, j = np.arange(k), (np.arange(k) + 1) % k
-    faces = np.concatenate(
-        [
-            np.stack([np.zeros(k, np.int64), 1 + i, 1 + j], axis=1),
-            np.stack([1 + i, 1 + k + i, 1 + k + j], axis=1),
-            np.stack([1 + i, 1 + k + j, 1 + j], axis=1),
-        ]
-    )
-    mesh = TriMesh(np.column_stack([points.real, points.imag, 0 * points.real]), faces)
-    field = CrossField("faces", smoothest(mesh))
-    aligned = align_field(mesh, field, [[0, 1], [0, 2]], AlignSettings(edge_length=1.0))
-    check_aligned(mesh, aligned)
-    inner = np.flatnonzero(aligned.feature & (aligned.mesh.twin >= 0))
-    edges = np.unique(aligned.mesh.halfedge_edge[inner])
-    ends = aligned.mesh.vertices[aligned.mesh.edges[edges]]
-    length = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum()
-    assert length == pytest.approx(7.5)

@@ -11,7 +11,7 @@ from tests.quad_meshes import quad_tube, triangulated
 from vhquad.field.cross import CrossField
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.quad import QuadMesh
-from vhquad.quad import component, limbs
+from vhquad.quad import limbs, tips
 from vhquad.quad.limbs import Covering, polished_onto_limbs
 from vhquad.quad.pipeline import RemeshResult, RemeshSettings, remesh_mesh
 
@@ -110,7 +110,7 @@ def test_a_limb_thinner_than_its_quads_is_kept(monkeypatch: pytest.MonkeyPatch) 
 
     assert top(run()) < 0.5 * edge
     # Without tips held from the start: what limbs alone do, and what no one does.
-    monkeypatch.setattr(component, "find_tips", lambda *_: np.zeros(0, dtype=np.int64))
+    monkeypatch.setattr(tips, "find_tips", lambda *_: np.zeros(0, dtype=np.int64))
     assert top(run()) < 0.5 * edge
     monkeypatch.setattr(limbs, "ROUNDS", 0)
     assert top(run()) > 2.0 * edge

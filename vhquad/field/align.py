@@ -33,7 +33,6 @@ Bools = NDArray[np.bool_]
 DEFAULT_QUADS = 2000
 SHORTEST_CREASE = 2.0  # edge lengths; of what is left where part of a crease was dropped
 LOOSE_CREASE = 1.5  # edge lengths; what dropping leaves as a shorter loose branch goes too
-DROPPED_AT_ONCE = 0.5  # edge lengths; edges longer than the shortest crease are dropped in parts
 SETTLE = 2.0  # edge lengths over which singularities may drift to better places
 SURE = 0.9  # confidence from which on directions may go before even sizes
 MOST_SPLITS = 12  # rounds of splitting where vertices are too few; one or two happen
@@ -206,26 +205,17 @@ def align_field(
     flat = np.flatnonzero(mesh.face_areas <= 0.0)
     if flat.size:
         raise MeshError(f"{flat.size} faces have no area, the first is {flat[0]}; run repair first")
-    given = mesh
     size = _quad_sizes(mesh, field, settings.edge_length)
     length = float(np.sqrt(mesh.area / (mesh.face_areas / size**2).sum()))
     feature = (mesh.twin < 0) | crease_halfedges(mesh, creases)
     n_creases = _count_creases(mesh, feature)
-    short, own = no_refinement(mesh), field
     while True:
         first = separate_features(mesh, feature)
-        posed = pose(first, feature, own, size, settings.smoothing, seam)
+        posed = pose(first, feature, field, size, settings.smoothing, seam)
         z = posed.solve()
         blunt = hopeless_creases(posed.match(z), SHORTEST_CREASE * length)
         if not blunt.any():
             break
-        step = _shortened(mesh, first.source[blunt], length)
-        if step.mesh.n_vertices > mesh.n_vertices:
-            short, mesh, own = short.then(step), step.mesh, _carried(own, step)
-            feature, size = step.carry(feature, False), size[step.parent]
-            seam = None if seam is None else step.carry(seam, False)
-            n_creases = _count_creases(mesh, feature)
-            continue
         feature[first.source[blunt]] = False
         feature &= ~_frayed(mesh, feature, first.source[blunt], LOOSE_CREASE * length)
     matched = posed.match(posed.settle(z, SETTLE * posed.size))
@@ -239,7 +229,7 @@ def align_field(
     matched, last = separate_singularities(matched)
     report = AlignReport(
         edge_length=length,
-        splits=matched.mesh.n_vertices - given.n_vertices,
+        splits=matched.mesh.n_vertices - mesh.n_vertices,
         corners=int(posed.corner.sum()),
         creases=n_kept,
         creases_dropped=n_creases - n_kept,
@@ -249,42 +239,7 @@ def align_field(
         singularities=_singularities(matched),
         crease_corners=_crease_corners(matched),
     )
-    return _pack(matched, short.then(first).then(room).then(last), field, report)
-
-
-def _shortened(mesh: TriMesh, halfedges: Ints, length: float) -> Refinement:
-    """Long edges among some halfedges split: where one end has no room, the other may.
-
-    Parameters
-    ----------
-    mesh : TriMesh
-    halfedges : (k,) int64
-    length : float
-        Edge length of the quads to come.
-    """
-    total = no_refinement(mesh)
-    span = mesh.edge_lengths.reshape(-1)
-    chosen = np.zeros(3 * mesh.n_faces, dtype=bool)
-    chosen[halfedges] = span[halfedges] > SHORTEST_CREASE * length
-    while True:
-        now = total.mesh
-        parts = total.carry(chosen, False)
-        parts &= now.edge_lengths.reshape(-1) > DROPPED_AT_ONCE * length
-        marked = np.zeros(now.n_edges, dtype=bool)
-        marked[now.halfedge_edge[parts]] = True
-        if not marked.any():
-            return total
-        total = total.then(split_edges(now, marked))
-
-
-def _carried(field: CrossField, step: Refinement) -> CrossField:
-    """A field on faces, on the faces of a refined mesh."""
-    return CrossField(
-        "faces",
-        field.z[step.parent] * np.exp(-4j * step.turn),
-        None if field.size is None else field.size[step.parent],
-        None if field.confidence is None else field.confidence[step.parent],
-    )
+    return _pack(matched, first.then(room).then(last), field, report)
 
 
 def _quad_sizes(mesh: TriMesh, field: CrossField, edge_length: float | None) -> Floats:

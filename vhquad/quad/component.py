@@ -3,8 +3,8 @@
 The field is aligned (:mod:`vhquad.field.align`), turned into a seamless map
 (:mod:`vhquad.quad.seamless_map`), cut into rectangles (:mod:`vhquad.quad.tmesh`), quantised
 (:mod:`vhquad.quad.quantize`), laid on the surface (:mod:`vhquad.quad.embed`), polished
-(:mod:`vhquad.quad.smooth`) without laying limbs bare (:mod:`vhquad.quad.limbs`) and freed of the
-last folds (:mod:`vhquad.quad.lift`). Where no valid map is found the field is smoothed further,
+(:mod:`vhquad.quad.smooth`) with tips held (:mod:`vhquad.quad.tips`) and no limb laid bare
+(:mod:`vhquad.quad.limbs`), and freed of the last folds (:mod:`vhquad.quad.lift`). Where no valid map is found the field is smoothed further,
 then creases are given up, and at last triangles are paired (:mod:`vhquad.quad.fallback`).
 """
 
@@ -16,7 +16,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from vhquad.errors import FieldError, ParametrizationError
 from vhquad.field.align import AlignedField, AlignReport, AlignSettings, align_field
@@ -41,7 +40,7 @@ from vhquad.quad.quantize import quantise
 from vhquad.quad.sag import sizes_for_creases
 from vhquad.quad.seamless_map import SeamlessMap, solve_seamless_map
 from vhquad.quad.smooth import smooth_quads
-from vhquad.quad.tips import find_tips
+from vhquad.quad.tips import put_on_tips
 from vhquad.quad.tmesh import build_tmesh
 from vhquad.report import MAP, ComponentReport, MeshCounts
 from vhquad.watch import Watch
@@ -308,7 +307,7 @@ def _polished(
     with watch("polish"):
         fixed, curves = _constraints(mapped.layout)
         guide = FieldGuide(mapped.aligned)
-        quads, fixed = _on_tips(quads, surface.mesh, fixed, curves)
+        quads, fixed = put_on_tips(quads, surface.mesh, fixed, curves)
 
         def polish(held: Bools) -> NDArray[np.float64]:
             return smooth_quads(quads.vertices, quads.quads, surface, held, curves, guide=guide)
@@ -317,26 +316,6 @@ def _polished(
     with watch("unfold"):
         moved, wrong = lifted(moved, quads.quads, surface, fixed | (curves.curve >= 0))
     return QuadMesh(moved, quads.quads), int(wrong.sum())
-
-
-def _on_tips(
-    quads: QuadMesh, mesh: TriMesh, fixed: Bools, curves: CurveConstraints
-) -> tuple[QuadMesh, Bools]:
-    """The quads with the vertices next to the surface's tips on them, and these vertices fixed."""
-    length = float(np.sqrt(mesh.area / quads.n_quads))
-    tips = find_tips(mesh, length, curves.points)
-    free = np.flatnonzero(~fixed & (curves.curve < 0))
-    if len(tips) == 0 or len(free) == 0:
-        return quads, fixed
-    found = cKDTree(quads.vertices[free]).query(mesh.vertices[tips])
-    away, nearest = np.asarray(found[0]), np.asarray(found[1])
-    vertices, held = quads.vertices.copy(), fixed.copy()
-    movers = free[nearest]
-    once = np.unique(movers, return_index=True)[1]
-    once = once[away[once] < length]
-    vertices[movers[once]] = mesh.vertices[tips[once]]
-    held[movers[once]] = True
-    return QuadMesh(vertices, quads.quads), held
 
 
 def _require_topology(quads: QuadMesh, mesh: TriMesh) -> None:

@@ -29,6 +29,7 @@ Ints = NDArray[np.int64]
 SAG = 0.01
 """Of the wanted edge length, that an edge may be off its crease: at 2,000 quads 0.02 to 0.03 % of
 the diagonal in the middle of the edge, where it is most."""
+UNSEEN = 2e-4  # of the diagonal: no edge need be nearer to its crease
 FINEST = 2.5  # times shorter than wanted otherwise: more costs squareness and sizes elsewhere
 GROWTH = 0.25  # of the edge length, from one edge to the next away from a crease
 PULL = 10.0  # weight of the length of crease edges, against directions over a strip of quads
@@ -75,7 +76,8 @@ def sizes_for_creases(aligned: AlignedField, adaptivity: float = 1.0) -> CurvedS
         vertices = np.append(mesh.tail[chain], mesh.head[chain[-1]])
         wanted = size[np.append(chain, chain[-1]) // 3]
         sag = np.maximum(chord_sags(mesh.vertices[vertices], wanted), 1e-12 * wanted)
-        ratio = np.maximum(np.sqrt(SAG * wanted / sag), 1.0 / FINEST)
+        allowed = np.maximum(SAG * wanted, UNSEEN * mesh.diagonal)
+        ratio = np.maximum(np.sqrt(allowed / sag), 1.0 / FINEST)
         np.minimum.at(bound, vertices, wanted * np.minimum(ratio, 1.0) ** adaptivity)
         density[chain] = 1.0 / (np.minimum(ratio[1:], ratio[:-1]) * wanted[:-1])
     bent = np.minimum(size, _spread(mesh, bound)[mesh.faces].mean(axis=1))

@@ -12,10 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.triangle import TriMesh
+from vhquad.quad.curves import CurveConstraints
 
-__all__ = ["find_tips"]
+__all__ = ["find_tips", "put_on_tips"]
 
+Bools = NDArray[np.bool_]
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
@@ -24,6 +27,41 @@ SHARE = 0.75  # of all defects close by, whatever their sign, that the turn must
 OWN_TURN = np.radians(30.0)  # of the vertex itself
 NEAR = 1.25  # edge lengths: close by
 CLEAR = 0.5  # edge lengths between a tip and a crease
+
+
+def put_on_tips(
+    quads: QuadMesh, mesh: TriMesh, fixed: Bools, curves: CurveConstraints
+) -> tuple[QuadMesh, Bools]:
+    """Put the vertices next to a surface's tips on them, and fix them there.
+
+    Parameters
+    ----------
+    quads : QuadMesh
+    mesh : TriMesh
+        The surface.
+    fixed : (n,) bool
+        Vertices that stay where they are.
+    curves : CurveConstraints
+        Vertices on these stay on them.
+
+    Returns
+    -------
+    quads : QuadMesh
+    fixed : (n,) bool
+    """
+    length = float(np.sqrt(mesh.area / quads.n_quads))
+    tips = find_tips(mesh, length, curves.points)
+    free = np.flatnonzero(~fixed & (curves.curve < 0))
+    if len(tips) == 0 or len(free) == 0:
+        return quads, fixed
+    found = cKDTree(quads.vertices[free]).query(mesh.vertices[tips])
+    away, mover = np.asarray(found[0]), free[np.asarray(found[1])]
+    once = np.unique(mover, return_index=True)[1]
+    once = once[away[once] < length]
+    vertices, held = quads.vertices.copy(), fixed.copy()
+    vertices[mover[once]] = mesh.vertices[tips[once]]
+    held[mover[once]] = True
+    return QuadMesh(vertices, quads.quads), held
 
 
 def find_tips(mesh: TriMesh, length: float, creases: Floats) -> Ints:
