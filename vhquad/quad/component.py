@@ -4,8 +4,9 @@ The field is aligned (:mod:`vhquad.field.align`), turned into a seamless map
 (:mod:`vhquad.quad.seamless_map`), cut into rectangles (:mod:`vhquad.quad.tmesh`), quantised
 (:mod:`vhquad.quad.quantize`), laid on the surface (:mod:`vhquad.quad.embed`), polished
 (:mod:`vhquad.quad.smooth`) with tips held (:mod:`vhquad.quad.tips`) and no limb laid bare
-(:mod:`vhquad.quad.limbs`), and freed of the last folds (:mod:`vhquad.quad.lift`). Where no valid map is found the field is smoothed further,
-then creases are given up, and at last triangles are paired (:mod:`vhquad.quad.fallback`).
+(:mod:`vhquad.quad.limbs`), and freed of the last folds (:mod:`vhquad.quad.lift`). Where no valid
+map is found the field is smoothed further, then creases are given up, and at last triangles paired
+(:mod:`vhquad.quad.fallback`).
 """
 
 from __future__ import annotations
