@@ -21,7 +21,7 @@ from vhquad.field.cross import CrossField
 from vhquad.field.dual import carry4, dirichlet, dual_weights
 from vhquad.field.smooth import unit
 from vhquad.geometry.laplacian import diffuse
-from vhquad.geometry.sparse import PositiveFactor
+from vhquad.geometry.sparse import SymmetricFactor
 from vhquad.mesh.triangle import TriMesh
 
 __all__ = ["bend_to_density"]
@@ -70,7 +70,7 @@ def bend_to_density(
         return field
     energy = dirichlet(mesh, dual_weights(mesh), carry)
     tiny = 1e-9 * mesh.face_areas / mesh.area  # components without any cross
-    z = PositiveFactor(energy + diags(stay + tiny)).solve(stay * field.z)
+    z = SymmetricFactor(energy + diags(stay + tiny)).solve(stay * field.z)
     return CrossField("faces", np.where(np.abs(z) > 0, unit(z), 0.0), field.size, field.confidence)
 
 

@@ -18,7 +18,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from vhquad.field.dual import dirichlet, dual_weights
 from vhquad.field.matching import QUARTER, MatchedField
-from vhquad.geometry.sparse import PositiveFactor
+from vhquad.geometry.sparse import SymmetricFactor
 from vhquad.mesh.triangle import next_halfedge
 
 __all__ = ["move_indices", "moved_and_relaxed", "near_pairs", "relax", "sector_graph", "trace"]
@@ -68,7 +68,7 @@ def relax(matched: MatchedField, free: Bools) -> MatchedField:
     matrix = dirichlet(mesh, weight, np.ones(len(weight)))[face][:, face]
     scale = matrix.diagonal().mean()
     turn = np.zeros(mesh.n_faces)
-    turn[face] = PositiveFactor(matrix + diags(np.full(len(face), 1e-9 * scale))).solve(pull)
+    turn[face] = SymmetricFactor(matrix + diags(np.full(len(face), 1e-9 * scale))).solve(pull)
     per_halfedge = np.repeat(turn, 3)
     change = np.where(matched.feature, 0.0, per_halfedge[mesh.twin] - per_halfedge)
     return replace(matched, angle=matched.angle + turn, jump=matched.jump + change)

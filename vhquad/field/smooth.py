@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_matrix, diags
 
 from vhquad.field.dual import carry4, dirichlet, dual_weights
-from vhquad.geometry.sparse import PositiveFactor
+from vhquad.geometry.sparse import SymmetricFactor
 from vhquad.mesh.triangle import TriMesh
 
 __all__ = ["polish", "relaxed", "settled", "smoothest", "unit"]
@@ -30,7 +30,7 @@ def smoothest(mesh: TriMesh, seed: int = 0) -> Complexes:
     """
     energy, mass = _energy(mesh), np.maximum(mesh.face_areas, 1e-12 * mesh.area / mesh.n_faces)
     scale = np.bincount(mesh.face_component, mass)[mesh.face_component]
-    factor = PositiveFactor(energy + diags(1e-3 * mass / scale))
+    factor = SymmetricFactor(energy + diags(1e-3 * mass / scale))
     rng = np.random.default_rng(seed)
     z = np.exp(1j * rng.uniform(0.0, 2.0 * np.pi, mesh.n_faces))
     for _ in range(INVERSE_ITERATIONS):
@@ -82,7 +82,7 @@ def relaxed(
         rows = energy[free]
         matrix = rows[:, free] + diags(weight[free])
         pull = weight[free] * target[free] - rows @ np.where(fixed, target, 0.0)
-        z[free] = PositiveFactor(matrix).solve(pull)
+        z[free] = SymmetricFactor(matrix).solve(pull)
     return z
 
 
@@ -120,7 +120,7 @@ def settled(
     rows = _energy(mesh)[free]
     pull = weight[free] * target[free] - rows @ np.where(fixed, target, 0.0)
     hold = (mesh.face_areas / length**2)[free]
-    factor = PositiveFactor(rows[:, free] + diags(weight[free] + hold))
+    factor = SymmetricFactor(rows[:, free] + diags(weight[free] + hold))
     for _ in range(SETTLING_STEPS):
         z[free] = unit(factor.solve(pull + hold * z[free]))
     return z

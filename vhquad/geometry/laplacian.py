@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, diags_array
 
 from vhquad.geometry.delaunay import IntrinsicTriangulation
-from vhquad.geometry.sparse import PositiveFactor
+from vhquad.geometry.sparse import SymmetricFactor
 
 __all__ = [
     "connection_laplacian",
@@ -115,4 +115,4 @@ def diffuse(laplacian: csr_matrix, mass: Floats, time: float, u: NDArray) -> NDA
     weight = mass.reshape((-1,) + (1,) * (u.ndim - 1))
     dtype = np.result_type(laplacian.dtype, u.dtype)
     system = (diags_array(mass) + time * laplacian).astype(dtype)
-    return PositiveFactor(system).solve((weight * u).astype(dtype))
+    return SymmetricFactor(system).solve((weight * u).astype(dtype))

@@ -32,7 +32,7 @@ from vhquad.geometry.laplacian import (
     gradient_operator,
     lumped_mass,
 )
-from vhquad.geometry.sparse import PositiveFactor
+from vhquad.geometry.sparse import SymmetricFactor
 from vhquad.mesh.triangle import TriMesh
 
 __all__ = ["RADII", "LocalCurvature", "local_curvature", "local_lines", "local_vectors"]
@@ -108,8 +108,8 @@ def local_curvature(
     scalar, lines = cotan_laplacian(tri), connection_laplacian(tri, order=2)
     gradient = gradient_operator(tri)
     found: tuple[list[NDArray], ...] = ([], [], [], [], [])
-    step: PositiveFactor | None = None
-    turn: PositiveFactor | None = None
+    step: SymmetricFactor | None = None
+    turn: SymmetricFactor | None = None
     for radius in radii:
         step = _step(scalar, mass, radius**2, step)
         turn = _step(lines, mass, radius**2, turn)
@@ -149,13 +149,13 @@ def _compressed(x: Complexes) -> Complexes:
 
 
 def _step(
-    laplacian: csr_matrix, mass: Floats, time: float, like: PositiveFactor | None
-) -> PositiveFactor:
+    laplacian: csr_matrix, mass: Floats, time: float, like: SymmetricFactor | None
+) -> SymmetricFactor:
     """Factor of one of ``STEPS`` implicit Euler steps of heat diffusion for a time."""
-    return PositiveFactor(diags_array(mass) + time / STEPS * laplacian, like)
+    return SymmetricFactor(diags_array(mass) + time / STEPS * laplacian, like)
 
 
-def _smoothed(step: PositiveFactor, mass: Floats, u: NDArray) -> NDArray:
+def _smoothed(step: SymmetricFactor, mass: Floats, u: NDArray) -> NDArray:
     """Values (n,) or (n, c) after all steps."""
     weight = mass.reshape((-1,) + (1,) * (u.ndim - 1))
     for _ in range(STEPS):

@@ -1,4 +1,4 @@
-"""Factors of sparse positive definite matrices, by SuperLU with minimum degree ordering."""
+"""Factors of sparse symmetric matrices, by SuperLU with minimum degree ordering."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
-__all__ = ["PositiveFactor"]
+__all__ = ["SymmetricFactor"]
 
 
-class PositiveFactor:
-    """Factor of a symmetric or Hermitian positive definite matrix; ``solve`` applies the inverse.
+class SymmetricFactor:
+    """Factor of a symmetric or Hermitian matrix; ``solve`` applies the inverse.
 
     Rows are shuffled first: in the order of a regularly subdivided mesh, minimum degree may take
     minutes where it takes a second in any other.
@@ -22,7 +22,7 @@ class PositiveFactor:
     ----------
     matrix : (n, n) sparse
         Real or complex, single or double precision.
-    like : PositiveFactor, optional
+    like : SymmetricFactor, optional
         Of a matrix with about the same entries: its elimination order is taken over, which is a
         third of the work.
     definite : bool
@@ -37,14 +37,14 @@ class PositiveFactor:
     """
 
     def __init__(
-        self, matrix: Any, like: PositiveFactor | None = None, definite: bool = True
+        self, matrix: Any, like: SymmetricFactor | None = None, definite: bool = True
     ) -> None:
         if like is None:
             self.order = np.random.default_rng(0).permutation(matrix.shape[0])
         else:
             self.order = like.order[np.argsort(like._factor.perm_c)]
         shuffled = matrix.tocsr()[self.order][:, self.order]
-        # Without pivoting the ordering holds, and the factor stays sparse.
+        # Without pivoting the ordering holds for certain, and the factor stays sparse.
         self._factor: Any = splu(
             csc_matrix(shuffled),
             permc_spec="MMD_AT_PLUS_A" if like is None else "NATURAL",

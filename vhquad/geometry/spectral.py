@@ -21,7 +21,7 @@ from scipy.linalg import LinAlgError, cholesky, eigh, get_blas_funcs
 from scipy.sparse import csr_matrix, diags_array
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from vhquad.geometry.sparse import PositiveFactor
+from vhquad.geometry.sparse import SymmetricFactor
 
 __all__ = ["Spectrum", "smallest_eigenpairs"]
 
@@ -89,10 +89,10 @@ def smallest_eigenpairs(
     return Spectrum(unit * np.maximum(values, 0.0), vectors)
 
 
-def _factor(standard: csr_matrix, shift: float, dtype: np.dtype) -> PositiveFactor:
+def _factor(standard: csr_matrix, shift: float, dtype: np.dtype) -> SymmetricFactor:
     """Factors of the matrix less a multiple of the unit matrix."""
     shifted = standard - shift * diags_array(np.ones(standard.shape[0]))
-    return PositiveFactor(shifted.astype(dtype), definite=shift < 0)
+    return SymmetricFactor(shifted.astype(dtype), definite=shift < 0)
 
 
 def _arpack(standard: csr_matrix, k: int) -> tuple[NDArray, NDArray]:

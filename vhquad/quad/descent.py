@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, diags_array
 
-from vhquad.geometry.sparse import PositiveFactor
+from vhquad.geometry.sparse import SymmetricFactor
 from vhquad.quad.corners import ahead, behind, corners, cross_rows, dot, gathered, shapes, unit_rows
 from vhquad.quad.distortion import SHARP, barrier_width
 from vhquad.quad.sliding import (
@@ -41,7 +41,7 @@ def better(a: State, b: State) -> bool:
     return (int(a.folded.sum()), a.energy) < (int(b.folded.sum()), b.energy)
 
 
-def spread(problem: Problem, state: State, factor: PositiveFactor, iterations: int) -> State:
+def spread(problem: Problem, state: State, factor: SymmetricFactor, iterations: int) -> State:
     """Move vertices so that quads come near their own best-fitting squares; the last state."""
     quads = problem.quads
     low, high = SQUARE_RANGE[0] * problem.size, SQUARE_RANGE[1] * problem.size
@@ -74,7 +74,7 @@ def _longest(problem: Problem, move: Floats) -> float:
     return float((np.linalg.norm(move, axis=1) / problem.reach)[~problem.fixed].max())
 
 
-def laplacian_factor(problem: Problem) -> PositiveFactor:
+def laplacian_factor(problem: Problem) -> SymmetricFactor:
     """Factor of the graph Laplacian (weights 1/size², a 1 % mass) over the vertices that move."""
     n = len(problem.fixed)
     free = np.flatnonzero(~problem.fixed)
@@ -86,10 +86,10 @@ def laplacian_factor(problem: Problem) -> PositiveFactor:
     adjacency = half + half.T
     degree = np.asarray(adjacency.sum(axis=1)).reshape(-1)
     laplacian = (diags_array(1.01 * degree) - adjacency).tocsr()[free][:, free]
-    return PositiveFactor(laplacian)
+    return SymmetricFactor(laplacian)
 
 
-def _solve(problem: Problem, factor: PositiveFactor, a: Floats) -> Floats:
+def _solve(problem: Problem, factor: SymmetricFactor, a: Floats) -> Floats:
     """Inverse Laplacian of vectors at the vertices, 0 where fixed."""
     out = np.zeros_like(a)
     free = ~problem.fixed
@@ -98,7 +98,7 @@ def _solve(problem: Problem, factor: PositiveFactor, a: Floats) -> Floats:
 
 
 def descend(
-    problem: Problem, state: State, factor: PositiveFactor, iterations: int, patience: int = 0
+    problem: Problem, state: State, factor: SymmetricFactor, iterations: int, patience: int = 0
 ) -> State:
     """Minimise the barrier energy.
 
@@ -106,7 +106,7 @@ def descend(
     ----------
     problem, state
         What to solve, and where to start.
-    factor : PositiveFactor
+    factor : SymmetricFactor
         Of :func:`laplacian_factor`.
     iterations : int
         Steps at most; fewer where the energy has settled. After them it goes on while quads are
@@ -170,7 +170,10 @@ def descend(
 
 
 def _two_loop(
-    problem: Problem, gradient: Floats, history: list[tuple[Floats, Floats]], factor: PositiveFactor
+    problem: Problem,
+    gradient: Floats,
+    history: list[tuple[Floats, Floats]],
+    factor: SymmetricFactor,
 ) -> Floats:
     """L-BFGS inverse Hessian times the gradient, the factored Laplacian in the middle."""
     q = gradient.copy()

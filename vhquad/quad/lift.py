@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, diags_array
 
-from vhquad.geometry.sparse import PositiveFactor
+from vhquad.geometry.sparse import SymmetricFactor
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.facing import FacingPoints
 from vhquad.mesh.quad import QuadMesh
@@ -169,7 +169,7 @@ def _squared(patch: _Patch, x: Floats) -> Floats:
     entry = (np.eye(4) - 0.25)[None] / patch.size[:, None, None]  # corners less their middle
     offsets = coo_matrix((entry.reshape(-1), (row, column)), (4 * k, len(x))).tocsr()
     moving = offsets[:, free]
-    factor = PositiveFactor((moving.T @ moving + diags_array(patch.pull)).tocsr())
+    factor = SymmetricFactor((moving.T @ moving + diags_array(patch.pull)).tocsr())
     rest = x.copy()
     rest[free] = 0.0
     base = offsets @ rest

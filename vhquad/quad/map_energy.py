@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_matrix, csr_matrix, diags_array
 
-from vhquad.geometry.sparse import PositiveFactor
+from vhquad.geometry.sparse import SymmetricFactor
 from vhquad.mesh.triangle import TriMesh
 
 __all__ = ["MapEnergy", "largest_step"]
@@ -137,4 +137,4 @@ def largest_step(frames: Floats, move: Floats) -> float:
 
 def solve_positive(matrix: csr_matrix, right: Floats) -> Floats:
     """Solution of a symmetric positive definite system."""
-    return PositiveFactor(matrix).solve(right)
+    return SymmetricFactor(matrix).solve(right)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, diags
 
 from vhquad.field.align import AlignedField
-from vhquad.geometry.sparse import PositiveFactor
+from vhquad.geometry.sparse import SymmetricFactor
 from vhquad.mesh.rings import within_rings
 from vhquad.mesh.triangle import TriMesh, next_halfedge
 from vhquad.quad.map_energy import MapEnergy
@@ -208,7 +208,7 @@ class _Problem:
         self.transpose = self.basis.T.tocsr()
         self.denominator = space.denominator
         self.pulls = pulls
-        self._factor: PositiveFactor | None = None  # of the last solve; weights alone change
+        self._factor: SymmetricFactor | None = None  # of the last solve; weights alone change
 
     @cached_property
     def energy(self) -> MapEnergy:
@@ -240,7 +240,7 @@ class _Problem:
         # Charts may drift together where nothing ties them down: hold them softly. The wanted
         # gradients do not care, so a weak pull on all unknowns changes nothing visible.
         matrix = matrix + diags(np.full(matrix.shape[0], 1e-9 * matrix.diagonal().mean()))
-        factor = PositiveFactor(matrix, like=self._factor)
+        factor = SymmetricFactor(matrix, like=self._factor)
         self._factor = factor
         return np.asarray(factor.solve(np.asarray(self.transpose @ right)))
 
@@ -258,7 +258,8 @@ class _Problem:
                 break
             z = self.corners(unknowns)
             a, b = z[:, 1] - z[:, 0], z[:, 2] - z[:, 0]
-            growth = np.sqrt(max(0.5 * float((a.conj() * b).imag.sum()) / self.wanted, 1e-3))
+            area = 0.5 * float((a.conj() * b).imag.sum())  # of a map turned inside out below 0
+            growth = np.sqrt(max(area / self.wanted, 1e-3))
             self.stretch = self.stretch / growth
             self.target = self.target / growth
 
