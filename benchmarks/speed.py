@@ -28,6 +28,10 @@ from typing import Any
 HERE = Path(__file__).parent
 SIZES = {3_000: 2_000, 10_000: 4_000, 60_000: 2_000, 200_000: 10_000, 500_000: 10_000}
 PEERS = ("instant-meshes", "quadriflow")
+FIELD_TO_QUADS = (
+    "stand-in", "polish of the field", "map", "quantise", "embedding", "smoothing", "limbs",
+    "unfolding",
+)  # fmt: skip
 EXTRA = {10_000: 8_000}  # quads that peers make as well: what QuadriFlow takes there is a bar
 Result = dict[str, Any]
 
@@ -163,6 +167,12 @@ def show(entries: list[Result]) -> None:
     for step in steps:
         row(step, lambda e, s=step: e["remesh"].get("steps", {}).get(s, {}).get("cpu"))
     table.add_section()
+
+    def to_quads(entry: Result) -> float | None:
+        found = entry["remesh"].get("steps")
+        return found and sum(found[name]["cpu"] for name in FIELD_TO_QUADS if name in found)
+
+    row("from the field to quads", to_quads)
     whole = dict.fromkeys(
         name
         for entry in entries

@@ -36,6 +36,8 @@ STEPS = {
     "quantise": [f"vhquad.quad.component.{name}" for name in ("trace", "build_tmesh", "quantise")],
     "embedding": ["vhquad.quad.component.embed_layout"],
     "smoothing": ["vhquad.quad.component.smooth_quads"],
+    "limbs": ["vhquad.quad.component.polished_onto_limbs"],
+    "unfolding": ["vhquad.quad.component.lifted"],
     "report": ["vhquad.quad.pipeline.check_quads"],
     "write": ["vhquad.mesh.io.write_quad_mesh"],
 }

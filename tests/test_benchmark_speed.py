@@ -47,7 +47,8 @@ def test_steps_name_functions_that_exist() -> None:
 def test_a_run_and_its_second(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     mesh = tmp_path / "ball.obj"
     write_triangle_mesh(mesh, icosphere(3))
-    entry = speed.measure(mesh, 300, Namespace(repeat=1, second=True, eigsh=1000, peers=False))
+    options = Namespace(repeat=2, second=True, eigsh=1000, peers=False)
+    entry = speed.measure(mesh, 300, (), options)
     assert entry["vertices"] == 642
     run, second = entry["remesh"], entry["second"]
     assert run["code"] in (0, 3)
@@ -56,10 +57,19 @@ def test_a_run_and_its_second(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert 0.5 * run["cpu"] < spent <= run["cpu"]  # what is left is the way out
     assert "network" not in second["steps"]  # the field was kept
     assert "map" in second["steps"]
-    assert entry["eigenpairs"]["eigsh"] > 0
+    assert len(run["all"]) == 2
+    assert run["cpu"] == max(run["all"])  # the upper one of two
+    pairs = entry["eigenpairs"]
+    assert [one["laplacian"] for one in pairs] == ["connection", "scalar"]
+    for one in pairs:
+        assert min(one["eigsh"], one["ours"]) > 0
+        assert one["span"] < 1e-3
+        assert one["values"] < 1e-4
     json.dumps(entry)
     speed.show([entry])
-    assert "eigenpairs, eigsh" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert "from the field to quads" in shown
+    assert "connection" in shown
     pytest.importorskip("matplotlib")
     speed.plot([entry, {**entry, "vertices": 6420}], tmp_path / "speed.png")
     assert (tmp_path / "speed.png").stat().st_size > 5000
