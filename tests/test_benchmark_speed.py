@@ -50,13 +50,14 @@ def test_a_run_and_its_second(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     options = Namespace(repeat=2, second=True, eigsh=1000, peers=False)
     entry = speed.measure(mesh, 300, (), options)
     assert entry["vertices"] == 642
-    run, second = entry["remesh"], entry["second"]
+    run, second = entry["remesh"], entry["second, more"]
     assert run["code"] in (0, 3)
     assert set(speed_run.STEPS) - {"proxy"} <= set(run["steps"])
     spent = sum(step["cpu"] for step in run["steps"].values())
     assert 0.5 * run["cpu"] < spent <= run["cpu"]  # what is left is the way out
     assert "network" not in second["steps"]  # the field was kept
     assert "map" in second["steps"]
+    assert entry["second, fewer"]["made"] < run["made"] < second["made"]
     assert len(run["all"]) == 2
     assert run["cpu"] == max(run["all"])  # the upper one of two
     pairs = entry["eigenpairs"]
