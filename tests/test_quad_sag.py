@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,7 @@ from tests.meshes import cone, cube, open_cylinder
 from vhquad.field.cross import CrossField
 from vhquad.mesh.triangle import TriMesh
 from vhquad.quad.pipeline import RemeshResult, RemeshSettings, remesh_mesh
-from vhquad.quad.sag import FINEST, SAG, chord_sags, sizes_for_creases
+from vhquad.quad.sag import FINEST, SAG, UNSEEN, chord_sags, sizes_for_creases
 from vhquad.quad.seamless_map import solve_seamless_map
 
 
@@ -74,6 +76,17 @@ def test_sizes_are_bounded_by_the_sag_at_the_same_count() -> None:
     on_rim = np.hypot(*s.aligned.mesh.vertices[s.aligned.mesh.faces[smallest], :2].T) > 0.99
     assert on_rim.sum() >= 1
     assert scale * s.edge / FINEST < bent.aligned.size[smallest] < 0.7 * scale * s.edge
+
+
+def test_no_edge_need_be_nearer_than_anyone_sees() -> None:
+    """Of quads of a twenty-fifth of the radius a hundredth is less than that."""
+    s = made(capped(cone(nu=384, nv=12)), quads=200)
+    assert s.aligned.size is not None
+    fine = replace(s.aligned, size=s.aligned.size * (0.04 / s.edge))
+    density = sizes_for_creases(fine).density
+    allowed = np.sqrt(8 * UNSEEN * s.aligned.mesh.diagonal)
+    assert allowed > np.sqrt(8 * SAG * 0.04)
+    np.testing.assert_allclose(1 / density[density > 0], allowed, rtol=0.05)
 
 
 def test_straight_creases_change_nothing() -> None:
