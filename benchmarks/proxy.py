@@ -36,7 +36,8 @@ def main() -> None:
     print(f"{'mesh':<24}{'vertices':>9}{'degrees':>9}{'trusted':>9}{'share':>7}{'size':>7}")
     for path in options.meshes:
         mesh = vhquad.load(path).mesh
-        if np.bincount(mesh.face_component).max() < 2 * PROXY_ABOVE:
+        parts = [mesh.submesh(mesh.face_component == c)[0] for c in range(mesh.n_components)]
+        if max(part.n_vertices for part in parts) <= PROXY_ABOVE:
             print(f"{path.stem:<24}{mesh.n_vertices:>9,}  needs no proxy")
             continue
         full, near = (predict_field(mesh, model, resolution=r) for r in ("full", "auto"))

@@ -12,6 +12,10 @@ from vhquad.field.sharpness import side_angles
 from vhquad.mesh.triangle import TriMesh
 
 
+def grown_at_40(mesh: TriMesh, pairs: np.ndarray) -> np.ndarray:
+    return grow_creases(mesh, pairs, sharp_edges(mesh, 40.0), 40.0)
+
+
 def edges_of(pairs: np.ndarray) -> set[tuple[int, int]]:
     return {(int(min(p)), int(max(p))) for p in pairs}
 
@@ -28,9 +32,9 @@ def test_the_rest_of_a_crease_comes_back() -> None:
     mesh = cube(6)
     creases = find_creases(mesh, 40.0)
     some = creases[::5]
-    assert len(grow_creases(mesh, some, 40.0)) == len(some)  # most sharp edges are no creases
+    assert len(grown_at_40(mesh, some)) == len(some)  # most sharp edges are no creases
     some = creases[15:]
-    grown = grow_creases(mesh, some, 40.0)
+    grown = grown_at_40(mesh, some)
     np.testing.assert_array_equal(grown[: len(some)], some)
     assert edges_of(grown) == edges_of(creases)
     assert len(grown) == len(creases)
@@ -49,7 +53,7 @@ def test_a_crease_that_turns_into_a_chamfer_goes_on() -> None:
     column = np.rint(mesh.vertices[pairs[:, 0], 0] * 1e6)
     one = pairs[column == column[0]]
     both, others = beside_a_cube(mesh)
-    grown = grow_creases(both, np.concatenate([one[:2], others]), 40.0)
+    grown = grown_at_40(both, np.concatenate([one[:2], others]))
     assert edges_of(grown) == edges_of(one) | edges_of(others)
 
 
@@ -61,7 +65,7 @@ def test_a_round_fold_does_not_join() -> None:
     first = mesh.edges[sharp[inner[:1]]]
     both, others = beside_a_cube(mesh)
     start = np.concatenate([first, others])
-    assert len(grow_creases(both, start, 40.0)) == len(start)
+    assert len(grown_at_40(both, start)) == len(start)
 
 
 def test_noise_does_not_join() -> None:
@@ -72,11 +76,11 @@ def test_noise_does_not_join() -> None:
     both, others = beside_a_cube(noisy)
     few = np.concatenate([noisy.edges[sharp[::100]], others])
     assert len(sharp) > 1000
-    assert len(grow_creases(both, few, 40.0)) < len(few) + 0.05 * len(sharp)
+    assert len(grown_at_40(both, few)) < len(few) + 0.05 * len(sharp)
 
 
 def test_nothing_grows_from_nothing() -> None:
-    assert grow_creases(cube(3), np.zeros((0, 2), np.int64), 40.0).shape == (0, 2)
+    assert grown_at_40(cube(3), np.zeros((0, 2), np.int64)).shape == (0, 2)
 
 
 def test_long_steps_of_a_designed_part_are_kept() -> None:
@@ -84,7 +88,9 @@ def test_long_steps_of_a_designed_part_are_kept() -> None:
     mesh = folded(3, np.radians(150), n=24)
     steps = edges_of(mesh.edges[sharp_edges(mesh, 40.0)])
     both, others = beside_a_cube(mesh)
-    assert edges_of(with_steps(both, others, 40.0, 0.69)) == steps | edges_of(others)
-    assert edges_of(with_steps(both, others, 40.0, 0.71)) == edges_of(others)
-    one = mesh.edges[sharp_edges(mesh, 40.0)][:1]
-    assert edges_of(with_steps(mesh, one, 40.0, 0.1)) == edges_of(one)
+    sharp = sharp_edges(both, 40.0)
+    assert edges_of(with_steps(both, others, sharp, 0.69)) == steps | edges_of(others)
+    assert edges_of(with_steps(both, others, sharp, 0.71)) == edges_of(others)
+    alone = sharp_edges(mesh, 40.0)
+    one = mesh.edges[alone][:1]
+    assert edges_of(with_steps(mesh, one, alone, 0.1)) == edges_of(one)

@@ -29,13 +29,13 @@ def test_corners_of_creases_are_no_tips() -> None:
     assert len(find_tips(box, 0.05, box.vertices[corners])) == 0
 
 
-def test_noise_has_hardly_any_tips() -> None:
+def test_noise_has_no_tips() -> None:
     sphere = icosphere(4)
     rng = np.random.default_rng(0)
     noisy = TriMesh(sphere.vertices * (1 + 0.03 * rng.normal(size=(2562, 1))), sphere.faces)
     length = float(np.sqrt(noisy.area / 500))
     assert len(find_tips(sphere, length, NONE)) == 0
-    assert len(find_tips(noisy, length, NONE)) <= 2
+    assert len(find_tips(noisy, length, NONE)) == 0
 
 
 def test_a_quad_vertex_is_on_the_tip() -> None:

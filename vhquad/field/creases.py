@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vhquad.field.bridge import bridge_gaps
-from vhquad.field.features import find_creases
+from vhquad.field.features import find_creases, sharp_edges
 from vhquad.field.grow import grow_creases, with_steps
 from vhquad.field.prune import prune_branches
 from vhquad.mesh.triangle import TriMesh
@@ -42,7 +42,8 @@ def creases_for_quads(
         Vertex pairs.
     """
     found = find_creases(mesh, degrees, together * edge_length)
-    grown = grow_creases(mesh, found, degrees)
-    stepped = with_steps(mesh, grown, degrees, together * edge_length)
+    sharp = sharp_edges(mesh, degrees)
+    grown = grow_creases(mesh, found, sharp, degrees)
+    stepped = with_steps(mesh, grown, sharp, together * edge_length)
     joined = bridge_gaps(mesh, stepped, GAP * edge_length)
     return prune_branches(mesh, joined, LOOSE * edge_length)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from vhquad.field.features import dihedral_angles, drop_short_creases, sharp_edges
+from vhquad.field.features import dihedral_angles, drop_short_creases
 from vhquad.field.sharpness import LEAST_AROUND, side_angles
 from vhquad.mesh.triangle import TriMesh
 
@@ -29,7 +29,7 @@ SHARE = 0.55  # least one of the bend around that an edge takes: two may share i
 MOSTLY = 0.7  # least share of creases in the length of all sharp edges
 
 
-def grow_creases(mesh: TriMesh, pairs: Ints, degrees: float) -> Ints:
+def grow_creases(mesh: TriMesh, pairs: Ints, sharp: Ints, degrees: float) -> Ints:
     """Crease edges with the sharp edges that hang together with them.
 
     Parameters
@@ -37,9 +37,10 @@ def grow_creases(mesh: TriMesh, pairs: Ints, degrees: float) -> Ints:
     mesh : TriMesh
     pairs : (k, 2) int64
         Crease edges as vertex pairs.
+    sharp : (j,) int64
+        Sharp edges, as :func:`vhquad.field.features.sharp_edges` finds them.
     degrees : float
-        Least angle between the normals of the two faces of an edge; the sides around it must differ
-        nearly as much.
+        By which they are sharp; the sides around an edge must differ nearly as much.
 
     Returns
     -------
@@ -47,7 +48,6 @@ def grow_creases(mesh: TriMesh, pairs: Ints, degrees: float) -> Ints:
         The same pairs, with others behind them.
     """
     pairs = np.asarray(pairs, dtype=np.int64).reshape(-1, 2)
-    sharp = sharp_edges(mesh, degrees)
     if len(pairs) == 0 or len(sharp) == 0:
         return pairs
     if not are_mostly_creases(mesh, pairs, sharp):
@@ -64,7 +64,7 @@ def grow_creases(mesh: TriMesh, pairs: Ints, degrees: float) -> Ints:
     return np.concatenate([pairs, others[np.isin(piece[others[:, 0]], piece[pairs])]])
 
 
-def with_steps(mesh: TriMesh, pairs: Ints, degrees: float, shortest: float) -> Ints:
+def with_steps(mesh: TriMesh, pairs: Ints, sharp: Ints, shortest: float) -> Ints:
     """Creases of a designed part with the long ones of its other sharp edges.
 
     Parameters
@@ -72,8 +72,8 @@ def with_steps(mesh: TriMesh, pairs: Ints, degrees: float, shortest: float) -> I
     mesh : TriMesh
     pairs : (k, 2) int64
         Crease edges as vertex pairs.
-    degrees : float
-        Least angle between the normals of the two faces of an edge.
+    sharp : (j,) int64
+        As in :func:`grow_creases`.
     shortest : float
         Connected pieces of other edges whose lengths sum to less are left out.
 
@@ -82,7 +82,6 @@ def with_steps(mesh: TriMesh, pairs: Ints, degrees: float, shortest: float) -> I
     (j, 2) int64
         The same pairs, with others behind them.
     """
-    sharp = sharp_edges(mesh, degrees)
     if not are_mostly_creases(mesh, pairs, sharp):
         return pairs
     others = _without(mesh, mesh.edges[sharp], pairs)
@@ -98,7 +97,7 @@ def are_mostly_creases(mesh: TriMesh, pairs: Ints, sharp: Ints) -> bool:
     pairs : (k, 2) int64
         Crease edges as vertex pairs.
     sharp : (j,) int64
-        Sharp edges, as :func:`vhquad.field.features.sharp_edges` finds them.
+        As in :func:`grow_creases`.
     """
     return _length(mesh, pairs) >= MOSTLY * _length(mesh, mesh.edges[sharp])
 
