@@ -38,7 +38,7 @@ from vhquad.learn.targets import leak
 __all__ = ["PreprocessSettings", "preprocess"]
 
 MESH_SUFFIXES = (".obj", ".ply", ".off", ".stl", ".glb")
-REVISION = 2  # raise when samples made by older code are no longer good
+REVISION = 3  # raise when samples made by older code are no longer good
 
 
 @dataclass(frozen=True)
