@@ -80,6 +80,7 @@ def test_given_creases_take_the_place_of_found_ones() -> None:
     edge = cube.edges[:1]
     found = make_stand_in(cube, 300, edge, 40.0)
     assert found is not None
+    assert np.isin(np.arange(found.mesh.n_vertices), found.mesh.faces).all()
     there = found.mesh.vertices[found.creases]
     assert np.array_equal(np.sort(there, axis=1), np.sort(cube.vertices[edge], axis=1))
 
@@ -111,12 +112,12 @@ def test_kept_ones_serve_other_counts_and_are_never_trusted_if_damaged(
 
     with monkeypatch.context() as patch:
         patch.setattr(stand_in, "thin_out", never)
-        second = make_stand_in(cube, 200, angle=40.0, cache=True)
+        second = make_stand_in(cube, 250, angle=40.0, cache=True)
         assert second is not None
         assert np.array_equal(first.mesh.vertices, second.mesh.vertices)
         assert np.array_equal(first.creases, second.creases)
         with pytest.raises(AssertionError, match="made again"):
-            make_stand_in(cube, 200, angle=50.0, cache=True)
+            make_stand_in(cube, 250, angle=50.0, cache=True)
     for damaged in (whole[: len(whole) // 2], b"", whole[:1000] + b"x" * 64 + whole[1064:]):
         entry.write_bytes(damaged)
         again = make_stand_in(cube, 300, angle=40.0, cache=True)

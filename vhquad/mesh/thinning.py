@@ -79,15 +79,22 @@ def _collapsed(piece: TriMesh, locked: Bools, n_faces: int) -> tuple[Floats, Int
     if (pins != pins[:, :1]).any() or off > 1e-6 * size:
         raise AssertionError("decimation moved vertices that were to be kept")
     new[where[kept]] = piece.vertices[kept]
-    return new, faces, where
+    used = np.zeros(len(new), dtype=bool)  # now and then a vertex without faces is left over
+    used[faces] = True
+    used[where[kept]] = True
+    number = np.cumsum(used) - 1
+    where[kept] = number[where[kept]]
+    return new[used], number[faces], where
 
 
 def _unsound(points: Floats, faces: Ints, held: Ints) -> Bools:
-    """Vertices at edges that are not manifold, of several fans, or of slivers that cannot be cured.
+    """Vertices left without faces, at edges that are not manifold, of several fans, or of slivers
+    that cannot be cured.
 
     Those are slivers between three held vertices: their corners will not move.
     """
-    bad = np.zeros(len(points), dtype=bool)
+    bad = np.ones(len(points), dtype=bool)
+    bad[faces] = False
     tail, head = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
     _, edge, count = np.unique(
         tail * np.int64(len(points)) + head, return_inverse=True, return_counts=True
