@@ -14,16 +14,16 @@ from vhquad.errors import ParametrizationError
 from vhquad.field.align import align_field
 from vhquad.field.cross import CrossField
 from vhquad.mesh.triangle import TriMesh
-from vhquad.quad import component
+from vhquad.quad import component, continuous
 from vhquad.quad.component import MAP, PAIRED
 from vhquad.quad.quantize import Quantisation, quantise
 from vhquad.quad.tmesh import TMesh
 
 
 def test_a_field_without_a_map_falls_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    solve = component.solve_seamless_map
+    solve = continuous.solve_seamless_map
     monkeypatch.setattr(
-        component, "solve_seamless_map", lambda *a, **k: replace(solve(*a, **k), flips=3, solves=9)
+        continuous, "solve_seamless_map", lambda *a, **k: replace(solve(*a, **k), flips=3, solves=9)
     )
     mesh = merge(icosphere(2), moved(grid(), (3.0, 0, 0)))
     result = run(mesh, 200)
@@ -90,7 +90,7 @@ def test_every_further_attempt_leaves_fewer_singularities(monkeypatch: pytest.Mo
     def never(tmesh: TMesh, target: float, area: float) -> Quantisation:
         raise ParametrizationError("not at this density")
 
-    monkeypatch.setattr(component, "align_field", watched)
+    monkeypatch.setattr(continuous, "align_field", watched)
     monkeypatch.setattr(component, "quantise", never)
     mesh = icosphere(3)
     result = run(mesh, 60, CrossField("faces", noisy(mesh, 1.0, np.random.default_rng(0))))

@@ -202,6 +202,7 @@ def remesh(
             cross,
             settings,
             density=factor,
+            cache=True,
             repair_lines=lines,
             watch=watch,
             progress=progress,

@@ -235,6 +235,7 @@ def remesh(
                 creases=creases,
                 density=factor,
                 with_uv=uv_out is not None,
+                cache=not no_cache,
                 repair_lines=loaded.lines(),
                 watch=watch,
                 progress=progress,

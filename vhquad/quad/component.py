@@ -1,11 +1,11 @@
 """Quads of one component: what is tried in turn until a valid mesh of about the count is there.
 
-The field is aligned (:mod:`vhquad.field.align`), turned into a seamless map
-(:mod:`vhquad.quad.seamless_map`), cut into rectangles (:mod:`vhquad.quad.tmesh`), quantised
-(:mod:`vhquad.quad.quantize`), laid on the surface (:mod:`vhquad.quad.embed`), polished
-(:mod:`vhquad.quad.smooth`) with tips held (:mod:`vhquad.quad.tips`) and no limb laid bare
-(:mod:`vhquad.quad.limbs`), and freed of the last folds (:mod:`vhquad.quad.lift`). Where no valid
-map is found the field is smoothed further, then creases are given up, and at last triangles paired
+The field is aligned and turned into a seamless map (:mod:`vhquad.quad.continuous`), cut into
+rectangles (:mod:`vhquad.quad.tmesh`), quantised (:mod:`vhquad.quad.quantize`), laid on the surface
+(:mod:`vhquad.quad.embed`), polished (:mod:`vhquad.quad.smooth`) with tips held
+(:mod:`vhquad.quad.tips`) and no limb laid bare (:mod:`vhquad.quad.limbs`), and freed of the last
+folds (:mod:`vhquad.quad.lift`). Where no valid map is found the field is smoothed further, then
+creases are given up, and at last triangles paired
 (:mod:`vhquad.quad.fallback`).
 """
 
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vhquad.errors import FieldError, ParametrizationError
-from vhquad.field.align import AlignedField, AlignReport, AlignSettings, align_field
+from vhquad.field.align import AlignedField, AlignReport
 from vhquad.field.creases import TOGETHER, creases_for_quads
 from vhquad.field.cross import CrossField
 from vhquad.field.features import sharp_edges
@@ -27,6 +27,7 @@ from vhquad.field.grow import are_mostly_creases
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.triangle import TriMesh
+from vhquad.quad.continuous import MapInput
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.embed import embed_layout
 from vhquad.quad.fallback import triangles_to_quads
@@ -36,10 +37,10 @@ from vhquad.quad.layout import Layout
 from vhquad.quad.lift import lifted
 from vhquad.quad.limbs import Covering, polished_onto_limbs
 from vhquad.quad.motorcycle import Tracing, trace
+from vhquad.quad.octaves import map_quads
 from vhquad.quad.parts import Part, UvMap
 from vhquad.quad.quantize import quantise
-from vhquad.quad.sag import sizes_for_creases
-from vhquad.quad.seamless_map import SeamlessMap, solve_seamless_map
+from vhquad.quad.seamless_map import SeamlessMap
 from vhquad.quad.smooth import smooth_quads
 from vhquad.quad.tips import put_on_tips
 from vhquad.quad.tmesh import build_tmesh
@@ -144,6 +145,8 @@ class Component:
         As in :func:`vhquad.quad.seamless_map.solve_seamless_map`.
     adaptivity : float
         How far sizes follow curved creases, 0 to 1.
+    cache : bool
+        Keep continuous maps, and use those kept.
     """
 
     mesh: TriMesh
@@ -156,11 +159,12 @@ class Component:
     seam: Bools | None
     size_weight: float
     adaptivity: float
+    cache: bool
 
     @property
     def length(self) -> float:
-        """Mean edge length of the wanted quads."""
-        return float(np.sqrt(self.mesh.area / self.target))
+        """Mean edge length of the quads that the map is made for."""
+        return float(np.sqrt(self.mesh.area / map_quads(self.target)))
 
     def attempts(self) -> Iterator[tuple[_Attempt, Ints]]:
         """What to try in turn, with the creases kept; nothing twice where none are to give up."""
@@ -267,18 +271,19 @@ def _by_map(
     ParametrizationError, FieldError
         If there is no valid map, or its quads are not a valid mesh of the input's topology.
     """
-    tell("align the field", 0.0)
-    with watch("align"):
-        settings = AlignSettings(wish.length, attempt.smoothing, attempt.cancel)
-        aligned = align_field(wish.mesh, wish.field, creases, settings, wish.seam)
-    tell("map", 0.15)
-    with watch("map"):
-        least: Floats | None = None
-        curved = wish.curving(creases)
-        if curved > 0:
-            bent = sizes_for_creases(aligned, curved)
-            aligned, least = bent.aligned, bent.density
-        seamless = solve_seamless_map(aligned, size_weight=wish.size_weight, least_density=least)
+    wanted = MapInput(
+        mesh=wish.mesh,
+        field=wish.field,
+        creases=creases,
+        target=wish.target,
+        smoothing=attempt.smoothing,
+        cancel=attempt.cancel,
+        seam=wish.seam,
+        size_weight=wish.size_weight,
+        curving=wish.curving(creases),
+    )
+    continuous = wanted.solve(wish.cache, watch, tell)
+    aligned, seamless = continuous.aligned, continuous.seamless
     if not seamless.is_valid:
         raise ParametrizationError(
             f"{seamless.flips} triangles of the map stay folded after {seamless.solves} solves"

@@ -98,6 +98,7 @@ def remesh_mesh(
     density: ArrayLike | None = None,
     onto: TriMesh | None = None,
     with_uv: bool = False,
+    cache: bool = False,
     progress: Progress | None = None,
 ) -> RemeshResult:
     """Quads along a cross field.
@@ -119,6 +120,8 @@ def remesh_mesh(
         polished on it and judged against it. Without a symmetry only.
     with_uv : bool
         Make the integer-grid map too; with a symmetry, that of the half.
+    cache : bool
+        Keep continuous maps, and use those kept.
     progress : callable, optional
         Called with (step, share done).
 
@@ -160,7 +163,7 @@ def remesh_mesh(
     size_weight = SIZE_WEIGHT if factor is None else 1.0  # who asks for a density wants it
     given = None if creases is None else np.asarray(creases, dtype=np.int64).reshape(-1, 2)
     result, parts, symmetry = _remesh(
-        mesh, field, given, settings, surface, size_weight, with_uv, watch, progress
+        mesh, field, given, settings, surface, size_weight, with_uv, cache, watch, progress
     )
     with watch("check"):
         quality = check_quads(result, surface)
@@ -191,6 +194,7 @@ def _remesh(
     surface: ClosestPoints,
     size_weight: float,
     with_uv: bool,
+    cache: bool,
     watch: Watch,
     progress: Progress | None,
 ) -> tuple[QuadMesh, list[Part], SymmetryReport | None]:
@@ -201,7 +205,7 @@ def _remesh(
     ) -> list[Part]:
         onto = surface if half is mesh else ClosestPoints(half)
         return _remesh_parts(
-            half, own, creases, seam, settings, onto, size_weight, with_uv, progress
+            half, own, creases, seam, settings, onto, size_weight, with_uv, cache, progress
         )
 
     symmetry: SymmetryReport | None = None
@@ -228,6 +232,7 @@ def _remesh_parts(
     surface: ClosestPoints,
     size_weight: float,
     with_uv: bool,
+    cache: bool,
     progress: Progress | None,
 ) -> list[Part]:
     """Quads of every component by itself; the field has the sizes wanted, the surface all parts."""
@@ -275,6 +280,7 @@ def _remesh_parts(
                     seam=edge,
                     size_weight=size_weight,
                     adaptivity=settings.adaptivity,
+                    cache=cache,
                 ),
                 with_uv,
                 tell,

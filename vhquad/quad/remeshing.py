@@ -55,7 +55,7 @@ def remesh_predicted(
         Whether a decimated copy may take the place of the mesh. It never does where the map was
         asked for or a symmetry, and if no map is found on it, all is done again on the mesh.
     cache : bool
-        Keep the stand-in, and use one that was kept.
+        Keep the stand-in and continuous maps, and use those that were kept.
 
     Other parameters are those of :func:`remesh_with`.
     """
@@ -81,6 +81,7 @@ def remesh_predicted(
             creases=copy.creases,
             density=None if density is None else copy.carry(np.asarray(density, dtype=np.float64)),
             onto=mesh,
+            cache=cache,
             repair_lines=repair_lines,
             watch=watch,
             progress=progress,
@@ -97,6 +98,7 @@ def remesh_predicted(
         creases=given,
         density=density,
         with_uv=with_uv,
+        cache=cache,
         repair_lines=repair_lines,
         watch=watch,
         progress=progress,
@@ -113,6 +115,7 @@ def remesh_with(
     density: ArrayLike | None = None,
     onto: TriMesh | None = None,
     with_uv: bool = False,
+    cache: bool = False,
     repair_lines: Sequence[str] = (),
     watch: Watch | None = None,
     progress: Progress | None = None,
@@ -133,6 +136,8 @@ def remesh_with(
         The surface that the mesh is a stand-in for, see :func:`vhquad.quad.pipeline.remesh_mesh`.
     with_uv : bool
         Make the integer-grid map on the triangles as well.
+    cache : bool
+        Keep continuous maps, and use those kept.
     repair_lines : sequence of str
         What was repaired.
     watch : Watch, optional
@@ -151,6 +156,7 @@ def remesh_with(
         density=density,
         onto=onto,
         with_uv=with_uv,
+        cache=cache,
         progress=progress,
     )
     watch = watch or Watch()

@@ -30,6 +30,7 @@ from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.shapely import shapely
 from vhquad.mesh.thinning import slim, thin_out
 from vhquad.mesh.triangle import TriMesh
+from vhquad.quad.octaves import middle_of_octave
 
 __all__ = ["StandIn", "make_stand_in"]
 
@@ -88,8 +89,8 @@ def make_stand_in(
     angle : float, optional
         In degrees; no creases if neither is given.
     cache : bool
-        Keep the stand-in, and take one that was kept. Sizes go in steps of two, so that it serves
-        other numbers of quads too.
+        Keep the stand-in, and take one that was kept. It serves other numbers of quads of the
+        octave too.
 
     Returns
     -------
@@ -97,8 +98,7 @@ def make_stand_in(
         None where the mesh is not much finer than its quads, or where decimation would not leave
         the topology, the borders and the creases as they are: the mesh then serves itself.
     """
-    steps = np.rint(np.log2(max(FACES_A_QUAD * n_quads / FEWEST_FACES, 1.0)))
-    budget = int(FEWEST_FACES * 2**steps)  # 7 to 14 triangles a quad
+    budget = max(FACES_A_QUAD * middle_of_octave(n_quads), FEWEST_FACES)  # 7 to 14 faces a quad
     if mesh.n_faces < WORTH_FROM * budget:
         return None
     quads = budget / FACES_A_QUAD

@@ -1,0 +1,105 @@
+"""Continuous maps: linear in the size of quads, kept for all counts of an octave."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.meshes import cube, icosphere, torus
+from tests.remesh_checks import plain_field
+from vhquad.mesh.triangle import TriMesh
+from vhquad.quad import continuous
+from vhquad.quad.continuous import ContinuousMap, MapInput
+from vhquad.quad.octaves import map_quads, middle_of_octave
+from vhquad.quad.pipeline import RemeshResult, RemeshSettings, remesh_mesh
+from vhquad.watch import Watch
+
+
+@pytest.fixture(autouse=True)
+def _own_cache(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("VHQUAD_CACHE", str(tmp_path))
+
+
+def _never(*args: object, **kwargs: object) -> None:
+    raise AssertionError("made again")
+
+
+def _run(mesh: TriMesh, count: int, cache: bool) -> RemeshResult:
+    return remesh_mesh(mesh, plain_field(mesh), RemeshSettings(count), cache=cache)
+
+
+def test_octaves() -> None:
+    """1. In steps of two, one after the other, each with its maps for one count."""
+    counts = np.geomspace(1.0, 1e6, 500)
+    middles = np.array([10_000 * map_quads(n) / 8_000 for n in counts])
+    assert (np.abs(np.log2(counts / middles)) <= 0.5 + 1e-9).all()
+    assert sorted(set(np.diff(np.log2(middles)).round(9))) == [0.0, 1.0]
+    assert [map_quads(n) for n in (7_100, 8_000, 10_000, 14_000)] == [8_000] * 4
+    assert [map_quads(n) for n in (500, 2_000, 14_200)] == [500, 2_000, 16_000]
+    assert middle_of_octave(9_000) == 10_000
+    assert middle_of_octave(1) == 1
+
+
+MESHES = {"ball": icosphere(4), "torus": torus(60, 40), "cube": cube(24)}
+
+
+@pytest.mark.parametrize("mesh", MESHES.values(), ids=MESHES)
+def test_other_counts_find_the_map(mesh: TriMesh, monkeypatch: pytest.MonkeyPatch) -> None:
+    """2. Of the octave, and they make the same quads of it as without; others make their own."""
+    _run(mesh, 500, cache=True)
+    alone = _run(mesh, 700, cache=False)
+    with monkeypatch.context() as patch:
+        patch.setattr(continuous, "align_field", _never)
+        patch.setattr(continuous, "solve_seamless_map", _never)
+        again = _run(mesh, 700, cache=True)
+        np.testing.assert_array_equal(again.quads.quads, alone.quads.quads)
+        np.testing.assert_array_equal(again.quads.vertices, alone.quads.vertices)
+        assert again.report.components[0].singularities == alone.report.components[0].singularities
+        for count in (430, 1000):
+            with pytest.raises(AssertionError, match="made again"):
+                _run(mesh, count, cache=True)
+        with pytest.raises(AssertionError, match="made again"):
+            _run(TriMesh(1.5 * mesh.vertices, mesh.faces), 700, cache=True)
+
+
+def _input(mesh: TriMesh, target: int) -> MapInput:
+    field = plain_field(mesh)
+    none = np.zeros((0, 2), dtype=np.int64)
+    return MapInput(mesh, field, none, target, 0.5, 0.5, None, 0.01, 0.0)
+
+
+def _solve(mesh: TriMesh, target: int) -> ContinuousMap:
+    return _input(mesh, target).solve(True, Watch(), lambda step, share: None)
+
+
+def test_a_kept_map_is_the_map(tmp_path: Path) -> None:
+    """3. To the last bit of every array; a damaged one is made again."""
+    mesh = torus(60, 40)
+    first = _solve(mesh, 500)
+    (entry,) = tmp_path.glob("map-*.npz")
+    whole = entry.read_bytes()
+    for damaged in (whole, whole[: len(whole) // 2], b"", whole[:1000] + b"x" * 64 + whole[1064:]):
+        entry.write_bytes(damaged)
+        second = _solve(mesh, 500)
+        for a, b in ((first.aligned, second.aligned), (first.seamless, second.seamless)):
+            for part in fields(a):
+                x, y = getattr(a, part.name), getattr(b, part.name)
+                if isinstance(x, TriMesh):
+                    np.testing.assert_array_equal(x.vertices, y.vertices)
+                    np.testing.assert_array_equal(x.faces, y.faces)
+                elif isinstance(x, np.ndarray):
+                    np.testing.assert_array_equal(x, y)
+                    assert x.dtype == y.dtype
+                else:
+                    assert x == y, part.name
+
+
+def test_maps_scale_with_the_count() -> None:
+    """4. Twice the quads: the map's area, in squared quads, is twice as large."""
+    mesh = torus(60, 40)
+    few, many = _solve(mesh, 450), _solve(mesh, 800)
+    assert many.seamless.area / few.seamless.area == pytest.approx(800 / 450, rel=1e-9)
+    assert few.aligned.size is None or (few.aligned.size > 0).all()
