@@ -56,7 +56,8 @@ def test_a_run_and_its_second(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     spent = sum(step["cpu"] for step in run["steps"].values())
     assert 0.5 * run["cpu"] < spent <= run["cpu"]  # what is left is the way out
     assert "network" not in second["steps"]  # the field was kept
-    assert "map" in second["steps"]
+    assert "map" not in second["steps"]  # nor was the map made again,
+    assert "map" in entry["second, twice"]["steps"]  # but for another octave
     assert entry["second, fewer"]["made"] < run["made"] < second["made"]
     assert len(run["all"]) == 2
     assert run["cpu"] == max(run["all"])  # the upper one of two

@@ -32,7 +32,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-_LEAST_FACES = 2000  # below this a look into the cache takes as long as the map
+_LEAST_FACES = 1000  # below this a look into the cache takes as long as the map
 _ALIGNED = (
     *("parent_face", "angle", "feature", "axis", "rotation"),
     *("sector", "sector_quads", "sector_vertex", "sector_is_feature"),
