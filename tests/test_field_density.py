@@ -107,20 +107,28 @@ def test_quads_follow_the_density() -> None:
 # ---- sizes ----------------------------------------------------------------------------------
 
 
+def _sizes(mesh: TriMesh, field: CrossField, **wish: object) -> tuple[np.ndarray, int]:
+    """Edge lengths and count; the sizes up to a factor are the same for any count."""
+    wanted = wanted_sizes(mesh, field, **wish)
+    other = wanted_sizes(mesh, field, density=wish["density"], target_quads=777)
+    np.testing.assert_array_equal(wanted.relative, other.relative)
+    return wanted.lengths, wanted.quads
+
+
 def test_sizes_of_a_density() -> None:
     """Edges go as the root; a count asked for is met; without one the count is multiplied."""
     mesh = icosphere(3)
     field = CrossField("faces", np.ones(mesh.n_faces), np.full(mesh.n_faces, 0.1))
     four = np.full(mesh.n_vertices, 4.0)
-    size, count = wanted_sizes(mesh, field, density=four)
+    size, count = _sizes(mesh, field, density=four)
     np.testing.assert_allclose(size, 0.05)
     assert count == round(4 * mesh.area / 0.1**2)
     half = np.where(mesh.vertices[:, 2] > 0, 9.0, 1.0)
-    size, count = wanted_sizes(mesh, field, density=half, target_quads=1000)
+    size, count = _sizes(mesh, field, density=half, target_quads=1000)
     assert count == 1000
     assert (mesh.face_areas / size**2).sum() == pytest.approx(1000)
     assert size.max() / size.min() == pytest.approx(3.0)
-    size, count = wanted_sizes(mesh, field, density=half, edge_length=0.2)
+    size, count = _sizes(mesh, field, density=half, edge_length=0.2)
     assert count == round(mesh.area / 0.2**2)
 
 
@@ -128,8 +136,8 @@ def test_absurd_sizes_are_not_believed() -> None:
     """Those of a barely trained model; a count that is asked for stands."""
     mesh = icosphere(2)
     field = CrossField("faces", np.ones(mesh.n_faces), np.full(mesh.n_faces, 1e-7))
-    assert wanted_sizes(mesh, field)[1] == 4000
-    assert wanted_sizes(mesh, field, target_quads=9000)[1] == 9000
+    assert wanted_sizes(mesh, field).quads == 4000
+    assert wanted_sizes(mesh, field, target_quads=9000).quads == 9000
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, np.nan, np.inf])

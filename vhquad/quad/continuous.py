@@ -66,7 +66,7 @@ class MapInput:
     ----------
     mesh : TriMesh
     field : CrossField
-        On its faces, with the sizes wanted.
+        On its faces. Its sizes count up to a factor: the target says what that is.
     creases : (k, 2) int64
     target : int
         Quads.
@@ -98,26 +98,17 @@ class MapInput:
         FieldError
             If there is no legal field. A map with folds is no error: see its ``is_valid``.
         """
-        factor = float(np.sqrt(self.target / map_quads(self.target)))
-        longer = self._with_sizes(factor)
         if cache and self.mesh.n_faces >= _LEAST_FACES:
             with watch("map"):
-                path = default_cache_dir() / f"map-{longer._key()}.npz"
+                path = default_cache_dir() / f"map-{self._key()}.npz"
                 found = _read(path)
             if found is None:
-                found = longer._made(watch, tell)
+                found = self._made(watch, tell)
                 with watch("map"):
                     write_arrays(path, _arrays(found))
         else:
-            found = longer._made(watch, tell)
-        return found.scaled(1.0 / factor)
-
-    def _with_sizes(self, factor: float) -> MapInput:
-        """For edges so many times as long, rounded so that any target leads to the same sizes."""
-        size = self.field.size
-        if size is not None:
-            size = (size * factor).astype(np.float32).astype(np.float64)
-        return replace(self, field=replace(self.field, size=size))
+            found = self._made(watch, tell)
+        return found.scaled(float(np.sqrt(map_quads(self.target) / self.target)))
 
     def _key(self) -> str:
         optional = [self.field.size, self.field.confidence, self.seam]
@@ -130,11 +121,15 @@ class MapInput:
         )
 
     def _made(self, watch: Watch, tell: Callable[[str, float], None]) -> ContinuousMap:
-        length = float(np.sqrt(self.mesh.area / map_quads(self.target)))
+        mesh, field, quads = self.mesh, self.field, map_quads(self.target)
+        length = float(np.sqrt(mesh.area / quads))
+        if field.size is not None:
+            count = float((mesh.face_areas / field.size**2).sum())
+            field = replace(field, size=field.size * np.sqrt(count / quads))
         tell("align the field", 0.0)
         with watch("align"):
             settings = AlignSettings(length, self.smoothing, self.cancel)
-            aligned = align_field(self.mesh, self.field, self.creases, settings, self.seam)
+            aligned = align_field(mesh, field, self.creases, settings, self.seam)
         tell("map", 0.15)
         with watch("map"):
             density: Floats | None = None

@@ -149,7 +149,7 @@ def remesh_mesh(
     if len(field) != mesh.n_faces:
         raise FieldError(f"the field has {len(field)} crosses, the mesh {mesh.n_faces} faces")
     factor = None if density is None else checked_density(density, mesh.n_vertices)
-    size, asked = wanted_sizes(
+    wanted = wanted_sizes(
         mesh,
         field,
         adaptivity=settings.adaptivity,
@@ -157,14 +157,19 @@ def remesh_mesh(
         target_quads=settings.target_quads,
         edge_length=settings.edge_length,
     )
-    field = replace(field, size=size)
+    field = replace(field, size=wanted.relative)
     if factor is not None:
-        field = bend_to_density(mesh, field, factor, float(np.sqrt(mesh.area / asked)))
-    size_weight = SIZE_WEIGHT if factor is None else 1.0  # who asks for a density wants it
+        field = bend_to_density(mesh, field, factor, float(np.sqrt(mesh.area / wanted.quads)))
     given = None if creases is None else np.asarray(creases, dtype=np.int64).reshape(-1, 2)
-    result, parts, symmetry = _remesh(
-        mesh, field, given, settings, surface, size_weight, with_uv, cache, watch, progress
+    wish = _Wish(
+        settings=settings,
+        scale=wanted.scale,
+        size_weight=SIZE_WEIGHT if factor is None else 1.0,  # who asks for a density wants it
+        with_uv=with_uv,
+        cache=cache,
+        progress=progress,
     )
+    result, parts, symmetry = _remesh(mesh, field, given, surface, wish, watch)
     with watch("check"):
         quality = check_quads(result, surface)
     seconds = dict(watch.seconds)
@@ -172,7 +177,7 @@ def remesh_mesh(
         for step, value in part.report.seconds.items():
             seconds[step] = seconds.get(step, 0.0) + value
     report = RemeshReport(
-        asked=asked,
+        asked=wanted.quads,
         made=result.n_quads,
         input=MeshCounts.of(original),
         output=MeshCounts.of(result),
@@ -186,17 +191,36 @@ def remesh_mesh(
     return RemeshResult(result, report, join_uv([part.uv for part in parts]))
 
 
+@dataclass(frozen=True)
+class _Wish:
+    """What is wanted of the quads of all parts alike.
+
+    Attributes
+    ----------
+    settings : RemeshSettings
+    scale : float
+        What makes edge lengths of the sizes of the field.
+    size_weight : float
+        As in :func:`vhquad.quad.seamless_map.solve_seamless_map`.
+    with_uv, cache, progress
+        As in :func:`remesh_mesh`.
+    """
+
+    settings: RemeshSettings
+    scale: float
+    size_weight: float
+    with_uv: bool
+    cache: bool
+    progress: Progress | None
+
+
 def _remesh(
     mesh: TriMesh,
     field: CrossField,
     given: Ints | None,
-    settings: RemeshSettings,
     surface: ClosestPoints,
-    size_weight: float,
-    with_uv: bool,
-    cache: bool,
+    wish: _Wish,
     watch: Watch,
-    progress: Progress | None,
 ) -> tuple[QuadMesh, list[Part], SymmetryReport | None]:
     """Quads of the whole mesh; of one half and its mirror image, if there is a plane for it."""
 
@@ -204,14 +228,12 @@ def _remesh(
         half: TriMesh, own: CrossField, creases: Ints | None, seam: Bools | None
     ) -> list[Part]:
         onto = surface if half is mesh else ClosestPoints(half)
-        return _remesh_parts(
-            half, own, creases, seam, settings, onto, size_weight, with_uv, cache, progress
-        )
+        return _remesh_parts(half, own, creases, seam, onto, wish)
 
     symmetry: SymmetryReport | None = None
-    if settings.symmetry != "off":
+    if wish.settings.symmetry != "off":
         with watch("symmetry"):
-            plane, symmetry = find_plane(mesh, settings.symmetry)
+            plane, symmetry = find_plane(mesh, wish.settings.symmetry)
         if plane is not None:
             try:
                 mirrored = remesh_mirrored(mesh, field, given, plane, remesh_parts)
@@ -228,16 +250,13 @@ def _remesh_parts(
     field: CrossField,
     given: Ints | None,
     seam: Bools | None,
-    settings: RemeshSettings,
     surface: ClosestPoints,
-    size_weight: float,
-    with_uv: bool,
-    cache: bool,
-    progress: Progress | None,
+    wish: _Wish,
 ) -> list[Part]:
-    """Quads of every component by itself; the field has the sizes wanted, the surface all parts."""
+    """Quads of every component by itself; the field has relative sizes, the surface all parts."""
+    settings, progress = wish.settings, wish.progress
     size = np.ones(mesh.n_faces) if field.size is None else field.size
-    density = mesh.face_areas / size**2
+    density = mesh.face_areas / (size * wish.scale) ** 2
     slack = SMALL_SHARE * float(density.sum())
     parts: list[Part] = []
     n_parts = mesh.n_components
@@ -278,11 +297,11 @@ def _remesh_parts(
                     creases=own,
                     crease_angle=settings.crease,
                     seam=edge,
-                    size_weight=size_weight,
+                    size_weight=wish.size_weight,
                     adaptivity=settings.adaptivity,
-                    cache=cache,
+                    cache=wish.cache,
                 ),
-                with_uv,
+                wish.with_uv,
                 tell,
             )
         )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -9,7 +11,7 @@ from vhquad.errors import ConfigError
 from vhquad.field.cross import CrossField
 from vhquad.mesh.triangle import TriMesh
 
-__all__ = ["SIZE_RANGE", "checked_density", "wanted_sizes"]
+__all__ = ["SIZE_RANGE", "WantedSizes", "checked_density", "wanted_sizes"]
 
 Floats = NDArray[np.float64]
 
@@ -18,6 +20,28 @@ MOST_A_FACE = 4.0  # quads; sizes that amount to more are not believed
 SIZE_RANGE = 8.0
 """Sizes of the field, and what a density makes of them, are kept within this factor of their
 middle."""
+
+
+class WantedSizes(NamedTuple):
+    """How long quad edges are to be.
+
+    Attributes
+    ----------
+    relative : (m,) float64
+        At each face, up to ``scale``: the same whatever the count asked for.
+    scale : float
+    quads : int
+        That the scaled lengths amount to.
+    """
+
+    relative: Floats
+    scale: float
+    quads: int
+
+    @property
+    def lengths(self) -> Floats:
+        """The edge lengths themselves; (m,)."""
+        return self.relative * self.scale
 
 
 def checked_density(density: ArrayLike, n_vertices: int, name: str = "density") -> Floats:
@@ -57,7 +81,7 @@ def wanted_sizes(
     density: Floats | None = None,
     target_quads: int | None = None,
     edge_length: float | None = None,
-) -> tuple[Floats, int]:
+) -> WantedSizes:
     """Wanted edge length of each face, and the number of quads that these amount to.
 
     Parameters
@@ -75,8 +99,7 @@ def wanted_sizes(
 
     Returns
     -------
-    size : (m,) float64
-    count : int
+    WantedSizes
     """
     if field.size is None or not (field.size > 0).any():
         size = np.ones(mesh.n_faces)
@@ -105,7 +128,7 @@ def wanted_sizes(
     else:
         target = float(DEFAULT_QUADS)
     count = float((mesh.face_areas / size**2).sum())
-    return size * np.sqrt(count / target), max(round(target), 1)
+    return WantedSizes(size, float(np.sqrt(count / target)), max(round(target), 1))
 
 
 def _mean(mesh: TriMesh, size: Floats) -> float:
