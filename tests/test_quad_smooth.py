@@ -25,6 +25,7 @@ from vhquad.quad.corners import ahead, behind, cross_rows
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.distortion import (
     corner_jacobians,
+    directions,
     distortion,
     misalignment,
     quad_normals,
@@ -211,7 +212,7 @@ def test_gradient_towards_oblong_quads(rng: np.random.Generator) -> None:
 
     def cost(x: np.ndarray) -> tuple[float, np.ndarray]:
         at = distortion(x, q, n, size, 0.1, 0.3, aspect=aspect)
-        off, pull = misalignment(x, q, n, size, along, aspect=aspect)
+        off, pull = misalignment(x, q, directions(n, along), size, aspect=aspect)
         return at.energy + off, at.gradient + pull
 
     move, h = rng.normal(size=v.shape), 1e-6
@@ -267,13 +268,13 @@ def test_edges_off_a_direction_cost_their_share_across() -> None:
     def cost(angle: float) -> float:
         c, s = np.cos(angle), np.sin(angle)
         along = first @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])
-        return misalignment(v, q, n, size, along)[0]
+        return misalignment(v, q, directions(n, along), size)[0]
 
     # Four unit edges a quad, each with sin(angle) across, over s = 2.
     assert cost(0.0) == pytest.approx(0.0, abs=1e-30)
     assert cost(0.3) == pytest.approx(len(q) * 0.5 * 4 * (np.sin(0.3) / 2) ** 2)
     assert cost(0.3 + np.pi) == pytest.approx(cost(0.3))
-    energy, gradient = misalignment(v, q, n, size, np.zeros_like(first))
+    energy, gradient = misalignment(v, q, directions(n, np.zeros_like(first)), size)
     assert energy == 0.0
     assert not gradient.any()
 
@@ -284,10 +285,11 @@ def test_gradient_of_the_misalignment(rng: np.random.Generator) -> None:
     n, size = quad_normals(x, q), rng.uniform(0.5, 1.0, len(q))
     along = rng.normal(size=(len(q), 3))
     along /= np.linalg.norm(along, axis=1, keepdims=True)
-    _, gradient = misalignment(x, q, n, size, along)
+    across = directions(n, along)
+    _, gradient = misalignment(x, q, across, size)
     move, h = rng.normal(size=v.shape), 1e-5
-    ahead = misalignment(x + h * move, q, n, size, along)[0]
-    behind = misalignment(x - h * move, q, n, size, along)[0]
+    ahead = misalignment(x + h * move, q, across, size)[0]
+    behind = misalignment(x - h * move, q, across, size)[0]
     # The energy is quadratic: central differences are exact up to rounding.
     assert (ahead - behind) / (2 * h) == pytest.approx((gradient * move).sum(), rel=1e-8)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import igl
@@ -22,14 +23,19 @@ Ints = NDArray[np.int64]
 class Hits:
     """Closest points of q queries; ``point = barycentric @ corners of face``."""
 
-    distance: Floats
-    """(q,) distance from the query, mesh units."""
+    query: Floats
+    """(q, 3) the queries."""
     face: Ints
     """(q,) face that holds the closest point."""
     barycentric: Floats
     """(q, 3) weights of the face's corners, each in [0, 1], summing to 1."""
     point: Floats
     """(q, 3) closest point."""
+
+    @cached_property
+    def distance(self) -> Floats:
+        """Distance of each closest point from its query, mesh units; (q,)."""
+        return np.asarray(np.linalg.norm(self.query - self.point, axis=1))
 
     def interpolate(self, corner_values: ArrayLike) -> NDArray[Any]:
         """Values at the closest points of a linear function given at face corners.
@@ -81,7 +87,7 @@ class ClosestPoints:
         corners = self._vertices[self._faces[face]]
         barycentric = closest_barycentrics(corners, p)
         point = np.einsum("qk,qki->qi", barycentric, corners)
-        return Hits(np.linalg.norm(p - point, axis=1), face, barycentric, point)
+        return Hits(p, face, barycentric, point)
 
     def query_near(self, points: ArrayLike, faces: ArrayLike) -> Hits:
         """Closest point of each query that a walk downhill finds, at most two faces a step.
@@ -121,7 +127,7 @@ class ClosestPoints:
             barycentric[walking] = weights.reshape(-1, 12, 3)[row, best]
             square[walking] = squares[row, best]
         point = np.einsum("qk,qki->qi", barycentric, self._vertices[self._faces[face]])
-        return Hits(np.sqrt(square), face, barycentric, point)
+        return Hits(p, face, barycentric, point)
 
     def _nearest_in(self, face: Ints, points: Floats) -> tuple[Floats, Floats]:
         """Barycentrics of the points of given faces nearest to queries, and squared distances."""

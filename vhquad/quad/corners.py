@@ -6,10 +6,23 @@ coordinates last.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["ahead", "behind", "corners", "cross_rows", "dot", "gathered", "shapes", "unit_rows"]
+__all__ = [
+    "Sides",
+    "ahead",
+    "behind",
+    "corners",
+    "cross_rows",
+    "dot",
+    "gathered",
+    "shapes",
+    "sides_of",
+    "unit_rows",
+]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -20,6 +33,20 @@ def corners(vectors: Floats, quads: Ints) -> Floats:
     return np.ascontiguousarray(vectors.T)[:, quads.T]
 
 
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """Corners of quads and the sides that leave them, for all that is asked of one position."""
+
+    corner: Floats  # (3, 4, k)
+    side: Floats  # (3, 4, k) from each corner to the next
+
+
+def sides_of(vertices: Floats, quads: Ints) -> Sides:
+    """Corners and sides of quads (k, 4) with vertices (n, 3)."""
+    p = corners(vertices, quads)
+    return Sides(p, ahead(p) - p)
+
+
 def gathered(at_corners: Floats, quads: Ints, n: int) -> Floats:
     """Sum of vectors (3, 4, k) at the corners of quads over each of n vertices; (n, 3)."""
     index = quads.T.reshape(-1)
@@ -28,7 +55,10 @@ def gathered(at_corners: Floats, quads: Ints, n: int) -> Floats:
 
 def dot(a: Floats, b: Floats) -> Floats:
     """Dot products along the first axis."""
-    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+    out = np.asarray(a[0] * b[0])
+    out += a[1] * b[1]
+    out += a[2] * b[2]
+    return out
 
 
 def cross_rows(a: Floats, b: Floats) -> Floats:

@@ -9,6 +9,8 @@ Hessian (Liu, Bouaziz & Kavan 2017).
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, diags_array
@@ -34,6 +36,15 @@ Ints = NDArray[np.int64]
 MEMORY = 6
 STALE, STALE_STEPS = 1e-4, 5  # where so many steps, free of folds, gain less, relative, it ends
 SQUARE_RANGE = (0.5, 2.0)  # of the wanted size, for the squares of `spread`
+
+
+@dataclass(frozen=True, eq=False)
+class _Change:
+    """A step of the descent and how the gradient changed with it, both (n, 3)."""
+
+    step: Floats
+    change: Floats
+    product: float  # of the two
 
 
 def better(a: State, b: State) -> bool:
@@ -119,7 +130,7 @@ def descend(
         The best state met (see `better`), the given one included.
     """
     best, best_at, number = state, 0, 0
-    history: list[tuple[Floats, Floats]] = []
+    history: list[_Change] = []
     energies: list[float] = []  # of the last steps, all without a fold
     gradient, moved, last_epsilon = np.zeros((0, 3)), np.zeros((0, 3)), 0.0
     while number < iterations or (best.folded.any() and number < best_at + patience):
@@ -128,15 +139,16 @@ def descend(
         epsilon = barrier_width(state.least)
         energy, slopes = state.energy, state.gradient
         if epsilon != SHARP or not len(slopes):
-            now = cost(problem, state.vertices, normals, epsilon)
+            now = cost(problem, state.vertices, normals, state.across, epsilon)
             energy, slopes = now.energy, now.gradient
         last, gradient = gradient, tangential(problem, state, slopes)
         if not 1 / 1.5 < epsilon / max(last_epsilon, 1e-300) < 1.5:
             history = []  # of another energy
         elif len(last):
             step, change = tangential(problem, state, moved), gradient - last
-            if (step * change).sum() > 1e-8 * np.linalg.norm(step) * np.linalg.norm(change):
-                history = [*history, (step, change)][-MEMORY:]
+            product = float((step * change).sum())
+            if product > 1e-8 * np.linalg.norm(step) * np.linalg.norm(change):
+                history = [*history, _Change(step, change, product)][-MEMORY:]
         last_epsilon = epsilon
         move = -tangential(problem, state, _two_loop(problem, gradient, history, factor))
         slope = float((move * gradient).sum())
@@ -150,7 +162,7 @@ def descend(
         scale = min(1.0, 1.0 / length)
         for _ in range(12):
             ahead = state.vertices + scale * move
-            trial = cost(problem, ahead, normals, epsilon, False).energy
+            trial = cost(problem, ahead, normals, state.across, epsilon, False).energy
             if trial <= energy + 1e-4 * scale * slope:
                 break
             scale *= 0.5
@@ -172,20 +184,20 @@ def descend(
 def _two_loop(
     problem: Problem,
     gradient: Floats,
-    history: list[tuple[Floats, Floats]],
+    history: list[_Change],
     factor: SymmetricFactor,
 ) -> Floats:
     """L-BFGS inverse Hessian times the gradient, the factored Laplacian in the middle."""
     q = gradient.copy()
     shares = []
-    for s, y in reversed(history):
-        share = (s * q).sum() / (s * y).sum()
+    for known in reversed(history):
+        share = (known.step * q).sum() / known.product
         shares.append(share)
-        q -= share * y
+        q -= share * known.change
     z = _solve(problem, factor, q)
     if history:
-        s, y = history[-1]
-        z *= (s * y).sum() / (y * _solve(problem, factor, y)).sum()
-    for (s, y), share in zip(history, reversed(shares), strict=True):
-        z += (share - (y * z).sum() / (s * y).sum()) * s
+        last = history[-1]
+        z *= last.product / (last.change * _solve(problem, factor, last.change)).sum()
+    for known, share in zip(history, reversed(shares), strict=True):
+        z += (share - (known.change * z).sum() / known.product) * known.step
     return z

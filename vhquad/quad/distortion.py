@@ -19,7 +19,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vhquad.quad.corners import ahead, behind, corners, cross_rows, dot, gathered, shapes, unit_rows
+from vhquad.quad.corners import (
+    Sides,
+    ahead,
+    behind,
+    cross_rows,
+    dot,
+    gathered,
+    shapes,
+    sides_of,
+    unit_rows,
+)
 from vhquad.quad.vectors import cross, unit
 
 __all__ = [
@@ -28,7 +38,9 @@ __all__ = [
     "barrier",
     "barrier_width",
     "corner_jacobians",
+    "directions",
     "distortion",
+    "inverted_quads",
     "misalignment",
     "quad_normals",
 ]
@@ -39,26 +51,36 @@ Ints = NDArray[np.int64]
 SHARP = 1e-3  # the least barrier width
 
 
-def quad_normals(vertices: Floats, quads: Ints) -> Floats:
-    """Unit average normal of each quad (of its vector area); (k, 3), zero where that is zero."""
-    p = corners(vertices, quads)
+def quad_normals(vertices: Floats, quads: Ints, sides: Sides | None = None) -> Floats:
+    """Unit average normal of each quad (of its vector area); (k, 3), zero where that is zero.
+
+    Here and below ``sides`` are those of the quads, where they are known already.
+    """
+    p = (sides or sides_of(vertices, quads)).corner
     normal = cross_rows(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
     return np.ascontiguousarray(unit_rows(normal).T)
 
 
 def corner_jacobians(vertices: Floats, quads: Ints, normals: Floats) -> Floats:
     """Scaled Jacobian at each corner against given quad normals; (k, 4), 0 at empty edges."""
-    p = corners(vertices, quads)
-    forward = ahead(p) - p
+    forward = sides_of(vertices, quads).side
     area = dot(cross_rows(forward, -behind(forward)), normals.T[:, None])
     length = np.sqrt(dot(forward, forward))
     scale = length * behind(length)
     return np.divide(area, scale, out=np.zeros_like(area), where=scale > 0).T
 
 
+def inverted_quads(sides: Sides, normals: Floats) -> NDArray[np.bool_]:
+    """Quads with a scaled Jacobian of 0 or less against given normals, at less cost; (k,)."""
+    area = dot(cross_rows(sides.side, -behind(sides.side)), normals.T[:, None])
+    return np.asarray((area <= 0).any(axis=0))
+
+
 def barrier(d: Floats, epsilon: float) -> tuple[Floats, Floats]:
     """√(D² + ε²) and χ(D), elementwise."""
     root = np.sqrt(d * d + epsilon * epsilon)
+    if (d > 0).all():
+        return root, 0.5 * (d + root)
     # For D < 0 the second form has no cancellation.
     return root, np.where(d > 0, 0.5 * (d + root), 0.5 * epsilon**2 / (root + np.abs(d)))
 
@@ -86,6 +108,7 @@ def distortion(
     size_weight: float,
     with_gradient: bool = True,
     aspect: Floats | None = None,
+    sides: Sides | None = None,
 ) -> Distortion:
     """Evaluate the energy of the module's head.
 
@@ -107,12 +130,13 @@ def distortion(
         Wanted length of edges 0 and 2 over that of edges 1 and 3. Default: 1, squares.
     """
     shape = shapes(aspect, len(quads))
-    p = corners(vertices, quads)
-    e1 = (ahead(p) - p) / shape
-    e2 = -behind(e1)
+    e1 = (sides or sides_of(vertices, quads)).side / shape
+    e2 = behind(e1)
+    np.negative(e2, out=e2)
     n = np.ascontiguousarray(normals.T)[:, None]
     per_area = 1.0 / size**2
-    d = dot(cross_rows(e1, e2), n) * per_area
+    d = dot(cross_rows(e1, e2), n)
+    d *= per_area
     squared = dot(e1, e1)
     stretch = 0.5 * (squared + behind(squared)) * per_area
     root, chi = barrier(d, epsilon)
@@ -121,46 +145,68 @@ def distortion(
         return Distortion(float(cost.sum()), np.zeros((0, 3)), d.T)
     by_stretch = per_area / chi
     by_area = (size_weight * d / chi - cost / root) * per_area
-    g1 = by_stretch * e1 + by_area * cross_rows(e2, n)
-    g2 = by_stretch * e2 + by_area * cross_rows(n, e1)
+    g1, g2 = cross_rows(e2, n), cross_rows(n, e1)  # in place from here on: these arrays are long
+    g1 *= by_area
+    g2 *= by_area
+    e1 *= by_stretch
+    e2 *= by_stretch
+    g1 += e1
+    g2 += e2
     g1 /= shape
     g2 /= behind(shape)
-    g = behind(g1) + ahead(g2) - g1 - g2
+    g = behind(g1)
+    g += ahead(g2)
+    g -= g1
+    g -= g2
     return Distortion(float(cost.sum()), gathered(g, quads, len(vertices)), d.T)
+
+
+def directions(normals: Floats, along: Floats) -> Floats:
+    """What :func:`misalignment` asks of edges: the direction that each should not have; (3, 4, k).
+
+    Parameters
+    ----------
+    normals : (k, 3) float64
+        Unit reference normal of each quad.
+    along : (k, 3) float64
+        Unit direction for edges 0 and 2 of each quad, either way; edges 1 and 3 should run at a
+        right angle to it. Zero where any direction will do.
+    """
+    first = unit(along - np.einsum("ki,ki->k", along, normals)[:, None] * normals)
+    second = cross(normals, first)
+    return np.stack([second.T, first.T, second.T, first.T], axis=1)
 
 
 def misalignment(
     vertices: Floats,
     quads: Ints,
-    normals: Floats,
+    across: Floats,
     size: Floats,
-    along: Floats,
     with_gradient: bool = True,
     aspect: Floats | None = None,
+    sides: Sides | None = None,
 ) -> tuple[float, Floats]:
     """How far edges run off given directions: half the squared share of each edge across, by s².
 
     Parameters
     ----------
-    vertices, quads, normals, size, with_gradient, aspect
+    vertices, quads, size, with_gradient, aspect, sides
         As in :func:`distortion`.
-    along : (k, 3) float64
-        Unit direction for edges 0 and 2 of each quad, either way; edges 1 and 3 should run at a
-        right angle to it. Zero where any direction will do.
+    across : (3, 4, k) float64
+        Of :func:`directions`.
 
     Returns
     -------
     energy : float
     gradient : (n, 3) float64
     """
-    first = unit(along - np.einsum("ki,ki->k", along, normals)[:, None] * normals)
-    second = cross(normals, first)
-    across = np.stack([second.T, first.T, second.T, first.T], axis=1)
-    p = corners(vertices, quads)
     length = size * shapes(aspect, len(quads))
-    share = dot(ahead(p) - p, across) / length
+    share = dot((sides or sides_of(vertices, quads)).side, across) / length
     energy = 0.5 * float((share**2).sum())
     if not with_gradient:
         return energy, np.zeros((0, 3))
-    g = share / length * across
-    return energy, gathered(behind(g) - g, quads, len(vertices))
+    share /= length
+    g = share * across
+    pull = behind(g)
+    pull -= g
+    return energy, gathered(pull, quads, len(vertices))

@@ -8,13 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vhquad.mesh.closest import ClosestPoints, Hits
-from vhquad.quad.corners import shapes
+from vhquad.quad.corners import Sides, shapes, sides_of
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.distortion import (
     SHARP,
     Distortion,
     corner_jacobians,
+    directions,
     distortion,
+    inverted_quads,
     misalignment,
     quad_normals,
 )
@@ -40,6 +42,7 @@ Bools = NDArray[np.bool_]
 SIZE_WEIGHT = 0.3
 GUIDANCE = 10.0  # weight of edges off the field's directions
 SAME_SIDE = 0.2  # least cosine between normals before and after a step
+ALIKE, NEARLY = 0.3, 0.7  # least cosine of a quad's normal with the surface's, smooth and of a face
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +69,9 @@ class State:
     arc: Floats  # (n,) arc length of ``on_curve`` vertices on their curves, 0 elsewhere
     normals: Floats  # (n, 3) surface normals, smooth
     face: Ints  # (n,) face of the surface under each vertex
+    tangents: Floats  # of the curves at ``on_curve`` vertices
     quad_normals: Floats  # (k, 3) reference normals of the energy
+    across: Floats | None  # (3, 4, k) directions that edges should not have; None if any will do
     folded: Bools  # (k,)
     energy: float  # at the least barrier width, to rank states
     gradient: Floats  # (n, 3) of that energy; (0, 3) while quads are folded
@@ -130,8 +135,7 @@ def place(problem: Problem, wanted: Floats, before: State | None) -> State:
         hits = problem.surface.query(wanted[free])
         x, face, normals = before.vertices.copy(), before.face.copy(), before.normals.copy()
         x[free], face[free], normals[free] = hits.point, hits.face, _smooth_normals(problem, hits)
-        tangent = problem.curves.tangent(line, before.arc[line], 0.25 * problem.reach[line])
-        along = np.einsum("vi,vi->v", wanted[line] - before.vertices[line], tangent)
+        along = np.einsum("vi,vi->v", wanted[line] - before.vertices[line], before.tangents)
         arc = before.arc.copy()
         arc[line] = problem.curves.wrap(line, arc[line] + along)
         through = np.einsum("vi,vi->v", normals, before.normals) < SAME_SIDE
@@ -159,31 +163,50 @@ def measure(problem: Problem, x: Floats, arc: Floats, normals: Floats, face: Int
     surface does at one of its corners.
     """
     quads = problem.quads
-    around, own = reference_normals(problem, normals), quad_normals(x, quads)
+    sides = sides_of(x, quads)
+    around, own = reference_normals(problem, normals), quad_normals(x, quads, sides)
     facing = np.einsum("ki,ki->k", own, around)
-    facets = problem.surface.mesh.face_normals[face]
-    nearest = np.einsum("kci,ki->kc", facets[quads], own).max(axis=1)
-    inverted = (corner_jacobians(x, quads, own) <= 0).any(axis=1)
-    folded = inverted | ((facing <= 0) & (nearest <= 0))
-    trusted = ~folded & ((facing > 0.3) | (nearest > 0.7))
+    doubted = np.flatnonzero(facing <= ALIKE)
+    facets = problem.surface.mesh.face_normals[face[quads[doubted]]]
+    nearest = np.ones(len(quads))
+    nearest[doubted] = np.einsum("kci,ki->kc", facets, own[doubted]).max(axis=1)
+    folded = inverted_quads(sides, own) | ((facing <= 0) & (nearest <= 0))
+    trusted = ~folded & (nearest > NEARLY)
     reference = np.where(trusted[:, None], own, around)
-    at = cost(problem, x, reference, SHARP, not folded.any())
-    least = float(at.area.min())
-    return State(x, arc, normals, face, reference, folded, at.energy, at.gradient, least)
+    across = directions(reference, problem.along) if problem.along.any() else None
+    at = cost(problem, x, reference, across, SHARP, not folded.any(), sides)
+    line = problem.on_curve
+    return State(
+        vertices=x,
+        arc=arc,
+        normals=normals,
+        face=face,
+        tangents=problem.curves.tangent(line, arc[line], 0.25 * problem.reach[line]),
+        quad_normals=reference,
+        across=across,
+        folded=folded,
+        energy=at.energy,
+        gradient=at.gradient,
+        least=float(at.area.min()),
+    )
 
 
 def cost(
-    problem: Problem, x: Floats, normals: Floats, epsilon: float, with_gradient: bool = True
+    problem: Problem,
+    x: Floats,
+    normals: Floats,
+    across: Floats | None,
+    epsilon: float,
+    with_gradient: bool = True,
+    sides: Sides | None = None,
 ) -> Distortion:
     """Distortion of the quads about some normals, and what their edges run off the field."""
-    out = distortion(
-        x, problem.quads, normals, problem.size, epsilon, SIZE_WEIGHT, with_gradient, problem.aspect
-    )
-    if not problem.along.any():
+    quads, size, aspect = problem.quads, problem.size, problem.aspect
+    sides = sides or sides_of(x, quads)
+    out = distortion(x, quads, normals, size, epsilon, SIZE_WEIGHT, with_gradient, aspect, sides)
+    if across is None:
         return out
-    off, pull = misalignment(
-        x, problem.quads, normals, problem.size, problem.along, with_gradient, problem.aspect
-    )
+    off, pull = misalignment(x, quads, across, size, with_gradient, aspect, sides)
     return replace(out, energy=out.energy + GUIDANCE * off, gradient=out.gradient + GUIDANCE * pull)
 
 
@@ -197,7 +220,7 @@ def tangential(problem: Problem, state: State, a: Floats) -> Floats:
     """The part of vectors at the vertices along which these can move."""
     out = a - np.einsum("vi,vi->v", a, state.normals)[:, None] * state.normals
     line = problem.on_curve
-    t = problem.curves.tangent(line, state.arc[line], 0.25 * problem.reach[line])
+    t = state.tangents
     out[line] = np.einsum("vi,vi->v", a[line], t)[:, None] * t
     out[problem.fixed] = 0.0
     return out
