@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from vhquad.errors import ParametrizationError
 from vhquad.field.align import AlignedField
-from vhquad.quad.motorcycle import Tracing, Track
+from vhquad.quad.motorcycle import Step, Tracing, Track
 from vhquad.quad.seamless_map import SeamlessMap
 
 __all__ = [
@@ -20,10 +21,11 @@ __all__ = [
     "cut_track",
     "exit_point",
     "feature_curves",
-    "surface_point",
+    "surface_points",
 ]
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,63 +100,76 @@ class Builder:
         return len(self.points) - 1
 
 
-def surface_point(b: Builder, face: int, u: float, v: float) -> Floats:
-    """Position on a face at chart coordinates."""
+def surface_points(b: Builder, face: Ints, uv: Floats) -> Floats:
+    """Positions on faces (q,) at chart coordinates (q, 2); (q, 3)."""
     p = b.uv[face].astype(np.float64)
-    e, g = p[1] - p[0], p[2] - p[0]
-    det = e[0] * g[1] - e[1] * g[0]
-    d = np.array([u, v]) - p[0]
-    s = (d[0] * g[1] - d[1] * g[0]) / det
-    t = (e[0] * d[1] - e[1] * d[0]) / det
-    corners = b.mesh.vertices[b.mesh.faces[face]]
-    return np.asarray(corners[0] + s * (corners[1] - corners[0]) + t * (corners[2] - corners[0]))
+    e, g, d = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0], uv - p[:, 0]
+    det = e[:, 0] * g[:, 1] - e[:, 1] * g[:, 0]
+    s = (d[:, 0] * g[:, 1] - d[:, 1] * g[:, 0]) / det
+    t = (e[:, 0] * d[:, 1] - e[:, 1] * d[:, 0]) / det
+    a, second, third = np.moveaxis(b.mesh.vertices[b.mesh.faces[face]], 1, 0)
+    return np.asarray(a + s[:, None] * (second - a) + t[:, None] * (third - a))
 
 
 def exit_point(b: Builder, track: Track) -> Floats:
     """Where a track leaves the face of its last step."""
-    step = track.steps[-1]
-    axis = step.direction % 2
-    end = _exit_coordinate(b, step.face, step.direction, step.level, step.at)
-    u, v = (end, step.level) if axis == 0 else (step.level, end)
-    return surface_point(b, step.face, u, v)
+    s = _step_arrays(track.steps[-1:])
+    return surface_points(b, s.face, s.charted(_exit_coordinates(b, s)))[0]
 
 
-def _exit_coordinate(b: Builder, face: int, direction: int, level: float, at: float) -> float:
-    """Moving coordinate at which an isoline leaves a face."""
-    axis = direction % 2
-    sign = 1 if direction < 2 else -1
-    p = b.uv[face].astype(np.float64)
-    best = at
+@dataclass(frozen=True, eq=False)
+class _StepArrays:
+    """Steps of a track as arrays, one entry a step."""
+
+    face: Ints
+    direction: Ints
+    level: Floats
+    at: Floats
+
+    def charted(self, moving: Floats) -> Floats:
+        """Chart coordinates where the moving ones are known; (q, 2)."""
+        along_u = (self.direction % 2 == 0)[:, None]
+        ahead = np.stack([moving, self.level], axis=1)
+        return np.where(along_u, ahead, ahead[:, ::-1])
+
+
+def _step_arrays(steps: Sequence[Step]) -> _StepArrays:
+    return _StepArrays(
+        np.array([s.face for s in steps], dtype=np.int64),
+        np.array([s.direction for s in steps], dtype=np.int64),
+        np.array([s.level for s in steps], dtype=np.float64),
+        np.array([s.at for s in steps], dtype=np.float64),
+    )
+
+
+def _exit_coordinates(b: Builder, s: _StepArrays) -> Floats:
+    """Moving coordinate at which the isoline of each step leaves its face; (q,)."""
+    row, axis = np.arange(len(s.face)), s.direction % 2
+    sign = np.where(s.direction < 2, 1, -1)
+    p = b.uv[s.face].astype(np.float64)
+    moving, still = p[row, :, axis], p[row, :, 1 - axis]
+    best = s.at
     for k in range(3):
-        a, c = p[k], p[(k + 1) % 3]
-        low, high = sorted((a[1 - axis], c[1 - axis]))
-        if low <= level <= high and high > low:
-            f = (level - a[1 - axis]) / (c[1 - axis] - a[1 - axis])
-            place = a[axis] + f * (c[axis] - a[axis])
-            if sign * (place - best) > 0:
-                best = place
-    return float(best)
+        a, c = still[:, k], still[:, (k + 1) % 3]
+        low, high = np.minimum(a, c), np.maximum(a, c)
+        crossed = (low <= s.level) & (s.level <= high) & (high > low)
+        share = (s.level - a) / np.where(crossed, c - a, 1.0)
+        place = moving[:, k] + share * (moving[:, (k + 1) % 3] - moving[:, k])
+        best = np.where(crossed & (sign * (place - best) > 0), place, best)
+    return best
 
 
-def _track_polyline(b: Builder, track: Track) -> tuple[Floats, Floats, list[float]]:
-    """Parametric length and position at each step's start and at the end; length by step."""
-    at = [0.0]
-    points = []
-    starts: list[float] = []
-    for index, step in enumerate(track.steps):
-        axis = step.direction % 2
-        u, v = (step.at, step.level) if axis == 0 else (step.level, step.at)
-        points.append(surface_point(b, step.face, u, v))
-        starts.append(at[-1])
+def _track_polyline(b: Builder, track: Track) -> tuple[Floats, Floats, float]:
+    """Parametric length and position at each step's start and at the end; coordinate of the end."""
+    s = _step_arrays(track.steps)
+    end = _exit_coordinates(b, s)
+    for i, step in enumerate(track.steps):
         if step.stop is not None:
-            end = float(step.stop)
-        else:
-            end = _exit_coordinate(b, step.face, step.direction, step.level, step.at)
-        at.append(at[-1] + abs(end - step.at))
-        if index == len(track.steps) - 1:
-            u, v = (end, step.level) if axis == 0 else (step.level, end)
-            points.append(surface_point(b, step.face, u, v))
-    return np.array(at), np.array(points), starts
+            end[i] = step.stop
+    at = np.concatenate([[0.0], np.cumsum(np.abs(end - s.at))])
+    face = np.append(s.face, s.face[-1])
+    uv = np.concatenate([s.charted(s.at), s.charted(end)[-1:]])
+    return at, surface_points(b, face, uv), float(end[-1])
 
 
 def cut_track(
@@ -165,7 +180,7 @@ def cut_track(
     end: int,
     first_half: dict[object, int],
 ) -> None:
-    at, points, starts = _track_polyline(b, track)
+    at, points, last = _track_polyline(b, track)
     nodes = [b.node_of_vertex[track.vertex]]
     places = [0.0]
     charts: list[tuple[int, int, float, float]] = []
@@ -176,16 +191,11 @@ def cut_track(
         sign = 1 if step.direction < 2 else -1
         coordinate = sign * stop.offset
         nodes.append(stop.node)
-        places.append(max(starts[stop.step] + abs(coordinate - step.at), places[-1]))
+        places.append(max(float(at[stop.step]) + abs(coordinate - step.at), places[-1]))
         charts.append(_chart(step.face, step.direction, step.level, coordinate))
     nodes.append(end)
     places.append(max(float(at[-1]), places[-1]))
     step = track.steps[-1]
-    last = (
-        float(step.stop)
-        if step.stop is not None
-        else _exit_coordinate(b, step.face, step.direction, step.level, step.at)
-    )
     charts.append(_chart(step.face, step.direction, step.level, last))
     made = _make_arcs(b, nodes, places, charts, charts, at, points, track=number)
     first_half[("track", number, 0)] = 2 * made[0]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from vhquad.field.align import AlignedField
-from vhquad.quad.layout import Layout
+from vhquad.quad.layout import Layout, side_length
 from vhquad.quad.seamless_map import SeamlessMap, rotate
 from vhquad.quad.tmesh import Patch, TMesh
 
@@ -85,6 +85,11 @@ def _side_parameters(layout: Layout, side: tuple[int, ...]) -> Floats:
     return np.asarray(middle / max(travelled, 1e-300))
 
 
+def _has_inner_points(layout: Layout, patch: Patch) -> bool:
+    """Whether a patch is more than one quad wide and high."""
+    return all(side_length(layout.lengths, side) > 1 for side in patch.sides[:2])
+
+
 _Cover = tuple[Ints, NDArray[np.complex128]]
 
 
@@ -98,10 +103,9 @@ def _fill(
     rank: Ints,
 ) -> None:
     """Place the inner points of one patch."""
-    grid = layout.grid(number)
-    inner = grid[1:-1, 1:-1]
-    if inner.size == 0:
+    if not _has_inner_points(layout, patch):
         return
+    inner = layout.grid(number)[1:-1, 1:-1]
     bottom, right, top, left = (_side_parameters(layout, side) for side in patch.sides)
     top, left = 1.0 - top[::-1], 1.0 - left[::-1]
     # On a line from bottom[i] to top[i] and one from left[j] to right[j], in the unit square.
@@ -165,7 +169,7 @@ def _cover(
     open rectangle. A triangle may lie in one patch more than once, in different places.
     """
     mesh = aligned.mesh
-    wanted = [p for p in range(len(tmesh.patches)) if layout.grid(p)[1:-1, 1:-1].size]
+    wanted = [p for p, patch in enumerate(tmesh.patches) if _has_inner_points(layout, patch)]
     size = np.zeros((len(tmesh.patches), 2))
     start: list[tuple[int, int, int, int, int]] = []
     for p in wanted:

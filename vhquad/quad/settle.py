@@ -16,7 +16,7 @@ from vhquad.mesh.rings import within_rings
 from vhquad.quad.chords import fit_chords
 from vhquad.quad.descent import descend, laplacian_factor
 from vhquad.quad.distortion import corner_jacobians
-from vhquad.quad.sliding import Problem, State, measure, place
+from vhquad.quad.sliding import Problem, State, measure, smooth_normals
 
 __all__ = ["settle_on_curves"]
 
@@ -67,10 +67,10 @@ def _followed(problem: Problem, state: State, arc: Floats, held: Bools) -> State
     line = problem.on_curve
     x = state.vertices.copy()
     x[line] = problem.curves.position(line, arc[line])
-    there = place(problem, x, None)
+    there = problem.surface.query(x[line])
     # The others keep what they know of the sheet of the surface that they are on.
     face, normals = state.face.copy(), state.normals.copy()
-    face[line], normals[line] = there.face[line], there.normals[line]
+    face[line], normals[line] = there.face, smooth_normals(problem, there)
     moved = np.linalg.norm(x - state.vertices, axis=1) > MOVED * problem.reach
     near = np.zeros(len(x), dtype=bool)
     near[problem.quads[within_rings(problem.quads, moved[problem.quads].any(axis=1), RINGS)]] = True

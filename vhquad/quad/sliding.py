@@ -32,6 +32,7 @@ __all__ = [
     "measure",
     "place",
     "reference_normals",
+    "smooth_normals",
     "tangential",
 ]
 
@@ -126,7 +127,7 @@ def place(problem: Problem, wanted: Floats, before: State | None) -> State:
     line = problem.on_curve
     if before is None:
         hits = problem.surface.query(wanted)
-        x, face, normals = hits.point, hits.face, _smooth_normals(problem, hits)
+        x, face, normals = hits.point, hits.face, smooth_normals(problem, hits)
         arc = np.zeros(len(x))
         arc[line] = problem.curves.locate(line, wanted[line])
         x[problem.fixed] = wanted[problem.fixed]
@@ -134,7 +135,7 @@ def place(problem: Problem, wanted: Floats, before: State | None) -> State:
         free = np.flatnonzero(~problem.fixed)
         hits = problem.surface.query(wanted[free])
         x, face, normals = before.vertices.copy(), before.face.copy(), before.normals.copy()
-        x[free], face[free], normals[free] = hits.point, hits.face, _smooth_normals(problem, hits)
+        x[free], face[free], normals[free] = hits.point, hits.face, smooth_normals(problem, hits)
         along = np.einsum("vi,vi->v", wanted[line] - before.vertices[line], before.tangents)
         arc = before.arc.copy()
         arc[line] = problem.curves.wrap(line, arc[line] + along)
@@ -144,12 +145,12 @@ def place(problem: Problem, wanted: Floats, before: State | None) -> State:
         if len(walkers):
             walked = problem.surface.query_near(wanted[walkers], before.face[walkers])
             x[walkers], face[walkers] = walked.point, walked.face
-            normals[walkers] = _smooth_normals(problem, walked)
+            normals[walkers] = smooth_normals(problem, walked)
     x[line] = problem.curves.position(line, arc[line])
     return measure(problem, x, arc, normals, face)
 
 
-def _smooth_normals(problem: Problem, hits: Hits) -> Floats:
+def smooth_normals(problem: Problem, hits: Hits) -> Floats:
     """Unit vertex normals of the surface, interpolated; (n, 3)."""
     mesh = problem.surface.mesh
     corners = mesh.vertex_normals[mesh.faces[hits.face]]  # of these faces alone: there may be many

@@ -22,7 +22,7 @@ from vhquad.quad.arcs import (
     cut_track,
     exit_point,
     feature_curves,
-    surface_point,
+    surface_points,
 )
 from vhquad.quad.motorcycle import Tracing
 from vhquad.quad.seamless import irregular_vertices
@@ -107,7 +107,7 @@ def build_tmesh(aligned: AlignedField, seamless: SeamlessMap, tracing: Tracing) 
             u, v = (hit.coordinate, other.level)
             if other.direction % 2:
                 u, v = v, u
-            node = b.node(surface_point(b, other.face, u, v))
+            node = b.node(surface_points(b, np.array([other.face]), np.array([[u, v]]))[0])
             side = -1 if (hit.direction - other.direction) % 4 == 1 else 1
             track_stops[hit.other].append(Stop(hit.step, sign * hit.coordinate, node, number, side))
             ends[number] = node
