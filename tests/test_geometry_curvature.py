@@ -10,7 +10,6 @@ from vhquad.geometry.curvature import (
     CurvatureCross,
     angle_defect,
     curvature_cross,
-    dihedral_angles,
     vertex_curvature,
 )
 from vhquad.geometry.frames import build_frames, face_axes, from_3d, vertex_axes
@@ -29,14 +28,14 @@ def torus_truth(points: np.ndarray, major: float, minor: float) -> tuple[np.ndar
 
 def test_dihedral_angles_of_a_cube() -> None:
     cube = meshes.cube(2)
-    angle = dihedral_angles(cube)
+    angle = cube.dihedral_angles
     # 1. Right angles at the 24 pieces of edge, seen from both sides; convex is positive.
     assert (np.abs(angle - np.pi / 2) < 1e-12).sum() == 48
     # 2. Flat elsewhere.
     assert (np.abs(angle) < 1e-12).sum() == angle.size - 48
     # 3. Inside out it is concave.
     inverse = TriMesh(cube.vertices, cube.faces[:, ::-1])
-    assert dihedral_angles(inverse).min() == pytest.approx(-np.pi / 2)
+    assert inverse.dihedral_angles.min() == pytest.approx(-np.pi / 2)
 
 
 @pytest.mark.parametrize("case", meshes.CLOSED, ids=str)

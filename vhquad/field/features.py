@@ -10,7 +10,6 @@ from scipy.sparse.csgraph import connected_components
 from vhquad.errors import ConfigError, MeshError
 from vhquad.field.matching import MatchedField
 from vhquad.field.sharpness import LEAST_AROUND, is_sudden
-from vhquad.geometry import curvature
 from vhquad.mesh.triangle import TriMesh, next_halfedge
 
 __all__ = [
@@ -30,7 +29,7 @@ Bools = NDArray[np.bool_]
 def dihedral_angles(mesh: TriMesh) -> Floats:
     """Angle between the normals of an edge's two faces, in [0, pi], 0 on boundaries; (ne,)."""
     either = mesh.edge_halfedges.max(axis=1)
-    return np.asarray(np.abs(curvature.dihedral_angles(mesh)[either]))
+    return np.asarray(np.abs(mesh.dihedral_angles[either]))
 
 
 def sharp_edges(mesh: TriMesh, degrees: float) -> Ints:

@@ -21,7 +21,6 @@ from numpy.typing import ArrayLike, NDArray
 from vhquad.atomic import write_atomic
 from vhquad.errors import FieldError
 from vhquad.field.features import crease_halfedges
-from vhquad.geometry.curvature import dihedral_angles
 from vhquad.mesh.triangle import TriMesh
 
 __all__ = ["read_sharp", "write_sharp"]
@@ -42,7 +41,7 @@ def write_sharp(
         Vertex pairs.
     """
     h = np.flatnonzero(crease_halfedges(mesh, creases) | (mesh.twin < 0))
-    convex = (dihedral_angles(mesh)[h] >= 0).astype(np.int64)
+    convex = (mesh.dihedral_angles[h] >= 0).astype(np.int64)
     rows = np.stack([convex, h // 3, h % 3], axis=1)
     text = "".join(f"{kind},{face},{edge}\n" for kind, face, edge in rows.tolist())
     write_atomic(path, f"{len(rows)}\n{text}")

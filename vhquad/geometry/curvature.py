@@ -29,7 +29,6 @@ __all__ = [
     "CurvatureCross",
     "angle_defect",
     "curvature_cross",
-    "dihedral_angles",
     "vertex_curvature",
 ]
 
@@ -101,20 +100,6 @@ def angle_defect(mesh: TriMesh, frames: Frames) -> Floats:
     return np.where(mesh.is_boundary_vertex, 0.0, 2.0 * np.pi - frames.angle_sum)
 
 
-def dihedral_angles(mesh: TriMesh) -> Floats:
-    """Angle between the normals across each halfedge, positive if convex, 0 on a border; (3m,)."""
-    inner = np.flatnonzero(mesh.twin >= 0)
-    n = mesh.face_normals
-    here, there = n[inner // 3], n[mesh.twin[inner] // 3]
-    along = mesh.vertices[mesh.head[inner]] - mesh.vertices[mesh.tail[inner]]
-    length = np.linalg.norm(along, axis=1, keepdims=True)
-    along = np.divide(along, length, out=np.zeros_like(along), where=length > 0)
-    sine = np.einsum("hi,hi->h", np.cross(here, there), along)
-    angle = np.zeros(3 * mesh.n_faces)
-    angle[inner] = np.arctan2(sine, np.einsum("hi,hi->h", here, there))
-    return angle
-
-
 def vertex_curvature(
     mesh: TriMesh,
     frames: Frames | None = None,
@@ -143,7 +128,7 @@ def vertex_curvature(
 
     # Each end of an edge gets half of its dihedral measure. The surface bends across the edge:
     # hence the minus, a quarter turn, of the line.
-    measure = 0.5 * dihedral_angles(mesh) * frames.lengths.reshape(-1)
+    measure = 0.5 * mesh.dihedral_angles * frames.lengths.reshape(-1)
     n = mesh.n_vertices
     total = np.bincount(mesh.tail, measure, n)
     turned = -0.5 * measure * np.exp(2j * frames.halfedge_angle)

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, diags_array
 
-from vhquad.geometry.curvature import angle_defect, dihedral_angles
+from vhquad.geometry.curvature import angle_defect
 from vhquad.geometry.delaunay import IntrinsicTriangulation
 from vhquad.geometry.frames import Frames
 from vhquad.geometry.laplacian import (
@@ -98,7 +98,7 @@ def local_curvature(
     """
     mass, n = lumped_mass(tri), mesh.n_vertices
     # Each end of an edge gets half of its dihedral measure; the surface bends across the edge.
-    bend = 0.5 * dihedral_angles(mesh) * frames.lengths.reshape(-1)
+    bend = 0.5 * mesh.dihedral_angles * frames.lengths.reshape(-1)
     turned = -0.5 * bend * np.exp(2j * frames.halfedge_angle)
     line = np.bincount(mesh.tail, turned.real, n) + 1j * np.bincount(mesh.tail, turned.imag, n)
     # The defect of a border vertex is no curvature: its area is left out of the mean.

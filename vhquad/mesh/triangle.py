@@ -311,6 +311,20 @@ class TriMesh:
         return np.asarray(np.arctan2(sine, cosine))
 
     @cached_property
+    def dihedral_angles(self) -> Floats:
+        """Angle between the normals across halfedges, positive if convex, 0 on a border; (3m,)."""
+        inner = np.flatnonzero(self.twin >= 0)
+        n = self.face_normals
+        here, there = n[inner // 3], n[self.twin[inner] // 3]
+        along = self.vertices[self.head[inner]] - self.vertices[self.tail[inner]]
+        length = np.linalg.norm(along, axis=1, keepdims=True)
+        along = np.divide(along, length, out=np.zeros_like(along), where=length > 0)
+        sine = np.einsum("hi,hi->h", np.cross(here, there), along)
+        angle = np.zeros(3 * self.n_faces)
+        angle[inner] = np.arctan2(sine, np.einsum("hi,hi->h", here, there))
+        return angle
+
+    @cached_property
     def vertex_normals(self) -> Floats:
         """Angle-weighted unit normals; (n, 3), zero at unused vertices."""
         total = np.zeros((self.n_vertices, 3))
