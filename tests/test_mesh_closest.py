@@ -35,6 +35,7 @@ def test_hits_agree_with_brute_force(case: Case, rng: np.random.Generator) -> No
     np.testing.assert_allclose(hits.interpolate(m.vertices[m.faces]), hits.point, atol=1e-14)
     np.testing.assert_allclose(np.linalg.norm(hits.point - p, axis=1), hits.distance)
     np.testing.assert_allclose(ClosestPoints(m).distance(p), hits.distance, rtol=1e-10)
+    np.testing.assert_array_equal(ClosestPoints(m).faces(p), hits.face)
 
 
 @pytest.mark.parametrize("case", EVERY, ids=str)

@@ -19,6 +19,7 @@ from tests.quad_meshes import (
 from vhquad.errors import MeshError
 from vhquad.mesh.closest import ClosestPoints, Hits
 from vhquad.mesh.quad import QuadMesh
+from vhquad.mesh.vectors import cross
 from vhquad.quad import descent
 from vhquad.quad.aspects import smoothed_aspects
 from vhquad.quad.corners import ahead, behind, cross_rows
@@ -34,7 +35,6 @@ from vhquad.quad.embed import embed_layout
 from vhquad.quad.guide import FieldGuide
 from vhquad.quad.sliding import folded_quads
 from vhquad.quad.smooth import smooth_quads, smoothed_sizes
-from vhquad.quad.vectors import cross
 
 NOBODY = np.zeros(0, dtype=np.int64)
 

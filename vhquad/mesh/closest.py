@@ -12,11 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from vhquad.errors import MeshError
 from vhquad.mesh.triangle import TriMesh
+from vhquad.mesh.vectors import cross
 
 __all__ = ["ClosestPoints", "Hits", "closest_barycentrics"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+_NEXT = np.array([1, 2, 0])  # after each corner of a triangle
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +143,10 @@ class ClosestPoints:
         """Distance of each point from the surface, half the work of :meth:`query`; (q,)."""
         return np.sqrt(self._search(points)[1])
 
+    def faces(self, points: ArrayLike) -> Ints:
+        """Face that holds the closest point of each query, without that point; (q,)."""
+        return self._search(points)[2]
+
     def _search(self, points: ArrayLike) -> tuple[Floats, Floats, Ints]:
         """The points as an array, their squared distances and closest faces."""
         p = np.array(points, dtype=np.float64, order="C")
@@ -171,12 +178,14 @@ def closest_barycentrics(corners: Floats, points: Floats) -> Floats:
         In [0, 1], summing to 1.
     """
     # Three edges: candidate k lies between corners k and k + 1.
-    edge = np.roll(corners, -1, axis=1) - corners
+    edge = np.take(corners, _NEXT, axis=1)
+    edge -= corners
     offset = points[:, None, :] - corners
     square = np.einsum("qki,qki->qk", edge, edge)
     along = np.einsum("qki,qki->qk", edge, offset)
     t = np.divide(along, square, out=np.zeros_like(along), where=square > 0).clip(0.0, 1.0)
-    gap = offset - t[:, :, None] * edge
+    gap = t[:, :, None] * edge
+    np.subtract(offset, gap, out=gap)
     distance = np.einsum("qki,qki->qk", gap, gap)
     best = distance.argmin(axis=1)
     row = np.arange(len(points))
@@ -185,11 +194,11 @@ def closest_barycentrics(corners: Floats, points: Floats) -> Floats:
     result[row, (best + 1) % 3] = t[row, best]
 
     # The inside: weight of corner k is the area of (k + 1, k + 2, point) over the whole.
-    normal = np.cross(edge[:, 0], -edge[:, 2])
+    normal = cross(edge[:, 0], -edge[:, 2])
     area = np.einsum("qi,qi->q", normal, normal)
-    part = np.einsum("qki,qi->qk", np.cross(edge, offset), normal)
+    part = np.einsum("qki,qi->qk", cross(edge, offset), normal)
     weight = np.divide(part, area[:, None], out=np.full_like(part, -1.0), where=area[:, None] > 0)
-    weight = np.roll(weight, -1, axis=1)
+    weight = np.take(weight, _NEXT, axis=1)
     height = np.divide(
         np.einsum("qi,qi->q", offset[:, 0], normal) ** 2,
         area,

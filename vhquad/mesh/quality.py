@@ -186,14 +186,14 @@ def flipped_quads(mesh: QuadMesh, surface: ClosestPoints) -> Ints:
     middle = p.mean(axis=1)
     normal = surface.mesh.face_normals
     own = _area_vectors(mesh)
-    beneath = normal[surface.query(middle).face]
+    beneath = normal[surface.faces(middle)]
     agree = np.einsum("qi,qi->q", beneath, own)
     doubt = np.flatnonzero(agree < 0.5 * np.linalg.norm(own, axis=1))
     around = 0.5 * (p[doubt] + middle[doubt, None])
-    face = surface.query(around.reshape(-1, 3)).face.reshape(-1, 4)
+    face = surface.faces(around.reshape(-1, 3)).reshape(-1, 4)
     beneath = beneath[doubt] + normal[face].sum(axis=1)
     doubt = doubt[np.einsum("qi,qi->q", beneath, own[doubt]) < 0]
-    face = surface.query(p[doubt].reshape(-1, 3)).face.reshape(-1, 4)
+    face = surface.faces(p[doubt].reshape(-1, 3)).reshape(-1, 4)
     doubt = doubt[np.einsum("qi,qi->q", normal[face].sum(axis=1), own[doubt]) < 0]
     return doubt[~_has_own_sheet(middle[doubt], own[doubt], surface.mesh)]
 

@@ -50,7 +50,7 @@ def shapely(mesh: TriMesh, free: Bools, keep: Ints, surface: ClosestPoints) -> T
         moved[free] = surface.query(middle[free]).point
         before = np.array(mesh.face_normals)
         doubtful = np.flatnonzero(within_rings(mesh.faces, slim(mesh)))
-        beneath = surface.query(mesh.vertices[mesh.faces[doubtful]].mean(axis=1)).face
+        beneath = surface.faces(mesh.vertices[mesh.faces[doubtful]].mean(axis=1))
         before[doubtful] = surface.mesh.face_normals[beneath]
         for _ in range(UNDOING_ROUNDS):
             now = TriMesh(moved, mesh.faces).face_normals

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vhquad.mesh.vectors import cross, unit
 from vhquad.quad.corners import (
     Sides,
     ahead,
@@ -30,7 +31,6 @@ from vhquad.quad.corners import (
     sides_of,
     unit_rows,
 )
-from vhquad.quad.vectors import cross, unit
 
 __all__ = [
     "SHARP",

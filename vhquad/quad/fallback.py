@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.triangle import TriMesh, next_halfedge, prev_halfedge
+from vhquad.mesh.vectors import cross, unit
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.decimate import decimate
 from vhquad.quad.ragged import PolygonMesh, midpoint_split
 from vhquad.quad.smooth import smooth_quads
-from vhquad.quad.vectors import cross, unit
 
 __all__ = ["boundary_curves", "pair_triangles", "triangles_to_quads"]
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from vhquad.field.align import AlignedField
 from vhquad.geometry.frames import face_axes, to_3d
 from vhquad.mesh.closest import ClosestPoints
-from vhquad.quad.vectors import cross, unit
+from vhquad.mesh.vectors import cross, unit
 
 __all__ = ["FieldGuide"]
 
@@ -32,7 +32,7 @@ class FieldGuide:
 
     def faces(self, points: Floats) -> Ints:
         """The face of the surface nearest to each point; (q,)."""
-        return self._surface.query(points).face
+        return self._surface.faces(points)
 
     def trust(self, faces: Ints) -> Floats:
         """Trust in the crosses of faces, in [0, 1]; (q,)."""

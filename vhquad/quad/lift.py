@@ -23,8 +23,8 @@ from vhquad.mesh.facing import FacingPoints
 from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.quality import flipped_quads, scaled_jacobians
 from vhquad.mesh.rings import separate_parts, within_rings
+from vhquad.mesh.vectors import unit
 from vhquad.quad.distortion import SHARP, barrier_width, distortion, quad_normals
-from vhquad.quad.vectors import unit
 
 __all__ = ["lifted", "rim_vertices", "wrong_quads"]
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vhquad.mesh.closest import ClosestPoints, Hits
+from vhquad.mesh.vectors import unit
 from vhquad.quad.corners import Sides, shapes, sides_of
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.distortion import (
@@ -20,7 +21,6 @@ from vhquad.quad.distortion import (
     misalignment,
     quad_normals,
 )
-from vhquad.quad.vectors import unit
 
 __all__ = [
     "GUIDANCE",

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from vhquad.errors import MeshError
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.rings import separate_parts, within_rings
+from vhquad.mesh.vectors import cross
 from vhquad.quad.aspects import smoothed_aspects
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.descent import better, descend, laplacian_factor, spread
@@ -24,7 +25,6 @@ from vhquad.quad.distortion import corner_jacobians
 from vhquad.quad.guide import FieldGuide
 from vhquad.quad.settle import settle_on_curves
 from vhquad.quad.sliding import Problem, State, make_problem, measure, place
-from vhquad.quad.vectors import cross
 
 __all__ = ["smooth_quads", "smoothed_sizes"]
 
