@@ -156,7 +156,7 @@ def main() -> None:
         "of all edges alike and weighted by their length, and the quads made; for edges that know "
         "nothing of the artist 22.5°. The artist's quads are not square, so his own edges are off "
         "the cross as well. \"Artist's field\" is what `remesh` makes of the artist's own cross at "
-        "the vertices of the triangles: no prediction could do better.",
+        "the vertices of the triangles, as a perfect prediction would give it.",
         "",
         "| mesh | " + " | ".join(names) + " |",
         "|---|" + "---|" * len(names),

@@ -107,7 +107,7 @@ def remesh_mirrored(
     mesh : TriMesh
         Sound, and about symmetric.
     field : CrossField
-        On its faces, with the sizes wanted.
+        On its faces, with sizes up to a common factor.
     creases : (k, 2) int64, optional
         Edges to keep.
     plane : MirrorPlane
