@@ -61,12 +61,18 @@ def test_more_agreement_is_more_confidence() -> None:
 
 
 def test_heads_are_known_cubes_are_not(shipped: Model) -> None:
-    """4. The head in examples/ against a cube; a torus is answered as its curvature says."""
+    """4. The head in examples/ against a cube, a ball and blobs; a torus is as its curvature says.
+
+    On one blob or another the answer and its mirror image may agree by chance, hence several.
+    """
     head = api.load(ROOT / "examples" / "head.obj").mesh
     known = predict_field(head, shipped)
     assert mean(head, known) > 0.95
-    for mesh in (cube(8), blob(3)):
-        assert mean(mesh, predict_field(mesh, shipped, cache=False)) < 0.5
+    unknown = [cube(8), icosphere(3), *(blob(3, seed) for seed in range(6))]
+    trust = [mean(mesh, predict_field(mesh, shipped, cache=False)) for mesh in unknown]
+    assert max(trust) < 0.9
+    assert np.mean(trust) < 0.4
+    assert max(trust[:2]) < 0.05  # nothing tells directions on these
     ring = torus(48, 24)
     field, other = (
         predict_field(ring, shipped, cache=False),
