@@ -102,6 +102,12 @@ def chosen(folder: Path, split: str | None, most: int) -> list[Path]:
     return paths[:most]
 
 
+def cell(means: tuple[float, float], quads: QuadMesh) -> str:
+    """What one mesh contributes to the table."""
+    edges, length = means
+    return f"{edges:.1f}°, {length:.1f}° ({quads.n_quads})"
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path, help="quad meshes")
@@ -120,14 +126,8 @@ def main() -> None:
         for path in paths:
             mesh = read_quad_mesh(path)
             artist = Artist(mesh)
-            row = [path.stem]
-
-            def enter(who: str, quads: QuadMesh, artist=artist, row=row) -> None:  # type: ignore[no-untyped-def]
-                means[who].append(artist.means(quads))
-                edges, length = means[who][-1]
-                row.append(f"{edges:.1f}°, {length:.1f}° ({quads.n_quads})")
-
-            enter("the artist's own", mesh)
+            means["the artist's own"].append(artist.means(mesh))
+            row = [path.stem, cell(means["the artist's own"][-1], mesh)]
             source, out = folder / "triangles.obj", folder / "quads.obj"
             triangles, field = hidden(mesh, options.vertices)
             write_triangles(source, triangles)
@@ -135,12 +135,16 @@ def main() -> None:
                 out.unlink(missing_ok=True)
                 words = command(tool, source, mesh.n_quads, out, folder / "report.json")
                 ended = run(words, LIMIT, folder / "log.txt", folder / "cache")
-                if ended["exit"] == 0 and out.exists():
-                    enter(tool, read_quad_mesh(out))
-                else:
+                if ended["exit"] != 0 or not out.exists():
                     row.append(f"exit {ended['exit']}")
+                    continue
+                made = read_quad_mesh(out)
+                means[tool].append(artist.means(made))
+                row.append(cell(means[tool][-1], made))
             settings = RemeshSettings(target_quads=mesh.n_quads)
-            enter("artist's field", remesh_mesh(triangles, field, settings).quads)
+            made = remesh_mesh(triangles, field, settings).quads
+            means["artist's field"].append(artist.means(made))
+            row.append(cell(means["artist's field"][-1], made))
             rows.append(row)
             print(*row, sep="  ", flush=True)
     given = f" --split {options.split}" if options.split else ""

@@ -59,7 +59,7 @@ ARRAYS = (
     "z", "size", "coherence",
 )  # fmt: skip
 PER_VERTEX = frozenset(ARRAYS) - {"faces", "eigenvalues"}
-FORMAT, VERSION = "vhquad-dataset", 2
+FORMAT, VERSION = "vhquad-dataset", 3  # since 3, truths are means over cells
 Split = Literal["train", "val", "test"]
 
 
@@ -200,7 +200,7 @@ def open_dataset(folder: Path | str) -> Dataset:
     if raw.get("version") != VERSION:
         raise DatasetError(
             f"{path} has version {raw.get('version')}, this vhquad reads {VERSION}; "
-            "preprocess again"
+            "run vhquad preprocess again into the same folder"
         )
     try:
         return Dataset(

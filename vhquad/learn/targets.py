@@ -10,8 +10,7 @@
    z = mean over the cell of the unit fourth powers, normalised; its modulus before is the coherence
    (1: all quads of the cell have one direction and are as good as rectangular); the size is the
    square root of the parallelogram's area, its geometric mean. Taken at the vertex alone, the truth
-   of small quads (eyelids, lips) would depend on where vertices happen to lie: those of two
-   triangulations of one head then differ by more than half of what a model is off.
+   of quads smaller than triangles (eyelids, lips) would depend on where vertices happen to lie.
 """
 
 from __future__ import annotations

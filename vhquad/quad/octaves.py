@@ -16,11 +16,11 @@ creases bound it: a map suits the coarser half of its octave, and is smoother an
 need be for the finest."""
 
 
-def middle_of_octave(n_quads: float) -> int:
-    """The number in the middle of the octave of a positive number of quads, rounded."""
-    return round(MIDDLE * 2.0 ** np.rint(np.log2(n_quads / MIDDLE)))
+def middle_of_octave(n_quads: float) -> float:
+    """The number in the middle of the octave of a positive number of quads."""
+    return float(MIDDLE * 2.0 ** np.rint(np.log2(n_quads / MIDDLE)))
 
 
 def map_quads(n_quads: float) -> float:
     """For how many quads the continuous map is made that serves this number."""
-    return float(MAPPED * MIDDLE * 2.0 ** np.rint(np.log2(n_quads / MIDDLE)))
+    return MAPPED * middle_of_octave(n_quads)

@@ -98,7 +98,8 @@ def make_stand_in(
         None where the mesh is not much finer than its quads, or where decimation would not leave
         the topology, the borders and the creases as they are: the mesh then serves itself.
     """
-    budget = max(FACES_A_QUAD * middle_of_octave(n_quads), FEWEST_FACES)  # 7 to 14 faces a quad
+    middle = middle_of_octave(n_quads)  # hence 7 to 14 triangles a quad
+    budget = max(round(FACES_A_QUAD * middle), FEWEST_FACES)
     if mesh.n_faces < WORTH_FROM * budget:
         return None
     quads = budget / FACES_A_QUAD
