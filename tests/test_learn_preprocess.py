@@ -172,7 +172,7 @@ def test_damaged_indices_are_refused(tmp_path: Path) -> None:
     index = tmp_path / "index.json"
     good = {
         "format": "vhquad-dataset",
-        "version": 2,
+        "version": 3,
         "features": "hks",
         "turned": True,
         "k": 8,
@@ -184,7 +184,7 @@ def test_damaged_indices_are_refused(tmp_path: Path) -> None:
     }
     assert _written(index, good) is None
     assert "not the index" in str(_written(index, {**good, "format": "x"}))
-    assert "version 1" in str(_written(index, {**good, "version": 1}))
+    assert "version 2" in str(_written(index, {**good, "version": 2}))  # its truths were others
     assert "damaged" in str(_written(index, {**good, "samples": [{"name": "a"}]}))
     entry = {
         "name": "../../a",
