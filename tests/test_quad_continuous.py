@@ -1,7 +1,8 @@
-"""Continuous maps: linear in the size of quads, kept for all counts of an octave."""
+"""Continuous maps: linear in the size of quads, kept for all counts of a class."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from tests.remesh_checks import plain_field
 from vhquad.mesh.triangle import TriMesh
 from vhquad.quad import continuous
 from vhquad.quad.continuous import ContinuousMap, MapInput
-from vhquad.quad.octaves import map_quads, middle_of_octave
+from vhquad.quad.counts import creased_map_quads, map_quads, stand_in_quads
 from vhquad.quad.pipeline import RemeshResult, RemeshSettings, remesh_mesh
 from vhquad.watch import Watch
 
@@ -31,34 +32,50 @@ def _run(mesh: TriMesh, count: int, cache: bool) -> RemeshResult:
     return remesh_mesh(mesh, plain_field(mesh), RemeshSettings(count), cache=cache)
 
 
-def test_octaves() -> None:
-    """1. In steps of two, one after the other, each with its maps for one count."""
+@pytest.mark.parametrize(
+    ("span", "made_for"),
+    [(4.0, lambda n: map_quads(n, 1e9)), (2.0, creased_map_quads)],
+    ids=["smooth", "creased"],
+)
+def test_classes(span: float, made_for: Callable[[float], float]) -> None:
+    """1. One after the other, each with its maps for one count near its least."""
     counts = np.geomspace(1.0, 1e6, 500)
-    middles = np.array([10_000 * map_quads(n) / 8_000 for n in counts])
-    assert (np.abs(np.log2(counts / middles)) <= 0.5 + 1e-9).all()
-    assert sorted(set(np.diff(np.log2(middles)).round(9))) == [0.0, 1.0]
-    assert [map_quads(n) for n in (7_100, 8_000, 10_000, 14_000)] == [8_000] * 4
-    assert [map_quads(n) for n in (500, 2_000, 14_200)] == [500, 2_000, 16_000]
-    assert middle_of_octave(9_000) == 10_000
-    assert middle_of_octave(1.0) == pytest.approx(1.0, rel=0.5)
+    made = np.array([made_for(n) for n in counts])
+    assert (counts / made > 0.88).all()
+    assert (counts / made < 0.89 * span).all()
+    assert sorted(set(np.diff(np.log(made) / np.log(span)).round(9))) == [0.0, 1.0]
+    assert [made_for(n) for n in (500, 2_000, 7_100, 14_000)] == [500, 2_000, 8_000, 8_000]
+
+
+def test_coarse_meshes_share_a_map() -> None:
+    """1. More quads than a quarter as many as triangles ask for no other map; stand-ins do."""
+    assert map_quads(9_000, 28_000) == map_quads(2_000, 28_000) == 2_000
+    assert map_quads(9_000, 29_000) == 8_000
+    assert stand_in_quads(7_100) == stand_in_quads(28_000) == 10_000
+    assert stand_in_quads(28_500) == 40_000
 
 
 MESHES = {"ball": icosphere(4), "torus": torus(60, 40), "cube": cube(24)}
+FOUND = {"ball": (700, 1700, 3000), "torus": (700, 1700, 3000), "cube": (700, 870)}
+MADE_AGAIN = {"ball": (430,), "torus": (430,), "cube": (430, 900)}
 
 
-@pytest.mark.parametrize("mesh", MESHES.values(), ids=MESHES)
-def test_other_counts_find_the_map(mesh: TriMesh, monkeypatch: pytest.MonkeyPatch) -> None:
-    """2. Of the octave, and they make the same quads of it as without; others make their own."""
+@pytest.mark.parametrize("name", MESHES)
+def test_other_counts_find_the_map(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """2. Of the class, and they make the same quads of it as without; others make their own."""
+    mesh = MESHES[name]
     _run(mesh, 500, cache=True)
-    alone = _run(mesh, 700, cache=False)
+    alone = [_run(mesh, count, cache=False) for count in FOUND[name]]
     with monkeypatch.context() as patch:
         patch.setattr(continuous, "align_field", _never)
         patch.setattr(continuous, "solve_seamless_map", _never)
-        again = _run(mesh, 700, cache=True)
-        np.testing.assert_array_equal(again.quads.quads, alone.quads.quads)
-        np.testing.assert_array_equal(again.quads.vertices, alone.quads.vertices)
-        assert again.report.components[0].singularities == alone.report.components[0].singularities
-        for count in (430, 1000):
+        for count, made in zip(FOUND[name], alone, strict=True):
+            again = _run(mesh, count, cache=True)
+            np.testing.assert_array_equal(again.quads.quads, made.quads.quads)
+            np.testing.assert_array_equal(again.quads.vertices, made.quads.vertices)
+            part, other = again.report.components[0], made.report.components[0]
+            assert part.singularities == other.singularities
+        for count in MADE_AGAIN[name]:
             with pytest.raises(AssertionError, match="made again"):
                 _run(mesh, count, cache=True)
         with pytest.raises(AssertionError, match="made again"):
@@ -68,7 +85,7 @@ def test_other_counts_find_the_map(mesh: TriMesh, monkeypatch: pytest.MonkeyPatc
 def _input(mesh: TriMesh, target: int) -> MapInput:
     field = plain_field(mesh)
     none = np.zeros((0, 2), dtype=np.int64)
-    return MapInput(mesh, field, none, target, 0.5, 0.5, None, 0.01, 0.0)
+    return MapInput(mesh, field, none, target, 500.0, 0.5, 0.5, None, 0.01, 0.0)
 
 
 def _solve(mesh: TriMesh, target: int) -> ContinuousMap:

@@ -95,7 +95,7 @@ def test_components_keep_their_order() -> None:
 
 def test_coarse_meshes_serve_themselves() -> None:
     assert make_stand_in(meshes.icosphere(4), 200, angle=40.0) is None
-    assert make_stand_in(meshes.icosphere(6), 5000, angle=40.0) is None
+    assert make_stand_in(meshes.icosphere(6), 8000, angle=40.0) is None
 
 
 def test_kept_ones_serve_other_counts_and_are_never_trusted_if_damaged(

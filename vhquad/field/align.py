@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from vhquad.errors import ConfigError, FieldError, MeshError
 from vhquad.field.cancel import absorb_at_features, cancel_pairs, cure_low_sectors, low_sectors
 from vhquad.field.constrained import pose
-from vhquad.field.cross import CrossField
+from vhquad.field.cross import CrossField, trust_in
 from vhquad.field.features import crease_halfedges, hopeless_creases
 from vhquad.field.matching import MatchedField
 from vhquad.field.prune import prune_branches
@@ -34,7 +34,6 @@ DEFAULT_QUADS = 2000
 SHORTEST_CREASE = 2.0  # edge lengths; of what is left where part of a crease was dropped
 LOOSE_CREASE = 1.5  # edge lengths; what dropping leaves as a shorter loose branch goes too
 SETTLE = 2.0  # edge lengths over which singularities may drift to better places
-SURE = 0.9  # confidence from which on directions may go before even sizes
 MOST_SPLITS = 12  # rounds of splitting where vertices are too few; one or two happen
 
 
@@ -48,7 +47,8 @@ class AlignSettings:
         Edge length of the quads to come, on average if the field has sizes. Default: the sizes of
         the field as they are, or what makes 2,000 quads.
     smoothing : float
-        Details of the field smaller than this many edge lengths are smoothed away.
+        Details of the field smaller than this many edge lengths are smoothed away, where it is
+        sure those below half of that.
     cancel : float
         Opposite singularities closer than this many edge lengths are cancelled, and those as close
         to a boundary or crease move on to it; 0 changes none.
@@ -165,7 +165,7 @@ class AlignedField:
         """
         if self.confidence is None:
             return np.zeros(self.mesh.n_faces)
-        return np.clip((self.confidence - SURE) / (1.0 - SURE), 0.0, 1.0)
+        return trust_in(self.confidence)
 
 
 def align_field(

@@ -10,11 +10,17 @@ from numpy.typing import NDArray
 
 from vhquad.errors import FieldError
 
-__all__ = ["CrossField", "Domain"]
+__all__ = ["CrossField", "Domain", "trust_in"]
 
 Domain = Literal["vertices", "faces"]
 
 ROUNDING = 1e-15  # of a modulus of 1
+SURE = 0.9  # confidence from which on directions count for more than even sizes and smoothness
+
+
+def trust_in(confidence: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far directions of some confidence go before even sizes and smoothness, in [0, 1]."""
+    return np.asarray(np.clip((confidence - SURE) / (1.0 - SURE), 0.0, 1.0))
 
 
 @dataclass(frozen=True, eq=False)

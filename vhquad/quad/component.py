@@ -28,6 +28,7 @@ from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.triangle import TriMesh
 from vhquad.quad.continuous import MapInput
+from vhquad.quad.counts import creased_map_quads, map_quads
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.embed import embed_layout
 from vhquad.quad.fallback import triangles_to_quads
@@ -37,7 +38,6 @@ from vhquad.quad.layout import Layout
 from vhquad.quad.lift import lifted
 from vhquad.quad.limbs import Covering, polished_onto_limbs
 from vhquad.quad.motorcycle import Tracing, trace
-from vhquad.quad.octaves import map_quads
 from vhquad.quad.parts import Part, UvMap
 from vhquad.quad.quantize import quantise
 from vhquad.quad.seamless_map import SeamlessMap
@@ -161,30 +161,36 @@ class Component:
     adaptivity: float
     cache: bool
 
-    @property
-    def length(self) -> float:
-        """Mean edge length of the quads that the map is made for."""
-        return float(np.sqrt(self.mesh.area / map_quads(self.target)))
+    def attempts(self) -> Iterator[tuple[_Attempt, Ints, float]]:
+        """What to try in turn, with the creases kept and the quads that the map is made for.
 
-    def attempts(self) -> Iterator[tuple[_Attempt, Ints]]:
-        """What to try in turn, with the creases kept; nothing twice where none are to give up."""
+        Nothing is tried twice where no creases are to give up.
+        """
         tried: set[tuple[float, bytes]] = set()
         for attempt in _ATTEMPTS:
-            creases = attempt.creases(self.mesh, self.creases, self.crease_angle, self.length)
+            quads = creased_map_quads(self.target)
+            creases = self._creases(attempt, quads)
+            shared = map_quads(self.target, self.mesh.n_faces)
+            if shared != quads and self.curving(creases) == 0:
+                quads, creases = shared, self._creases(attempt, shared)
             key = (attempt.smoothing, creases.tobytes())
             if key not in tried:
                 tried.add(key)
-                yield attempt, creases
+                yield attempt, creases, quads
+
+    def _creases(self, attempt: _Attempt, quads: float) -> Ints:
+        length = float(np.sqrt(self.mesh.area / quads))
+        return attempt.creases(self.mesh, self.creases, self.crease_angle, length)
 
     def curving(self, creases: Ints) -> float:
         """How far sizes follow these creases where they are curved.
 
-        Only where creases were given, or most of what is sharp are creases: elsewhere the doubtful
-        ones would take the quads that shapes need.
+        Only where there are any, and they were given, or most of what is sharp are creases:
+        elsewhere the doubtful ones would take the quads that shapes need.
         """
-        if self.creases is None and (
-            self.crease_angle is None or not are_mostly_creases(self.mesh, creases, self._sharp)
-        ):
+        if len(creases) == 0:
+            return 0.0
+        if self.creases is None and not are_mostly_creases(self.mesh, creases, self._sharp):
             return 0.0
         return self.adaptivity
 
@@ -215,9 +221,9 @@ def remesh_component(wish: Component, with_uv: bool, tell: Progress) -> Part:
             reasons.append(f"{wrong} quads stay folded")
         return wrong == 0 or len(done) == MOST_POLISHED
 
-    for attempt, creases in wish.attempts():
+    for attempt, creases, for_quads in wish.attempts():
         try:
-            mapped = _by_map(wish, creases, attempt, watch, tell)
+            mapped = _by_map(wish, creases, attempt, for_quads, watch, tell)
         except (ParametrizationError, FieldError) as problem:
             reasons.append(str(problem))
             continue
@@ -244,7 +250,7 @@ def remesh_component(wish: Component, with_uv: bool, tell: Progress) -> Part:
     else:
         with watch("fallback"):
             quads = triangles_to_quads(wish.mesh, target, angle=wish.field.angle)
-        method, aligning = PAIRED, AlignReport(wish.length)
+        method, aligning = PAIRED, AlignReport(float(np.sqrt(wish.mesh.area / target)))
     tell("done", 1.0)
     report = ComponentReport(
         vertices=wish.mesh.n_vertices,
@@ -262,7 +268,12 @@ def remesh_component(wish: Component, with_uv: bool, tell: Progress) -> Part:
 
 
 def _by_map(
-    wish: Component, creases: Ints, attempt: _Attempt, watch: Watch, tell: Progress
+    wish: Component,
+    creases: Ints,
+    attempt: _Attempt,
+    for_quads: float,
+    watch: Watch,
+    tell: Progress,
 ) -> _Mapped:
     """Quads by an integer-grid map, their vertices where the map has them.
 
@@ -276,6 +287,7 @@ def _by_map(
         field=wish.field,
         creases=creases,
         target=wish.target,
+        quads=for_quads,
         smoothing=attempt.smoothing,
         cancel=attempt.cancel,
         seam=wish.seam,

@@ -1,7 +1,7 @@
 """The continuous map of a component: its field aligned, and the seamless map of that.
 
 But for smoothing, both are linear in the size of quads. So they are made for a number of quads that
-stands for its octave (:mod:`vhquad.quad.octaves`) and scaled, and another number of the same octave
+stands for its class (:mod:`vhquad.quad.counts`) and scaled, and another number of the same class
 finds them in the cache.
 """
 
@@ -21,7 +21,6 @@ from vhquad.errors import MeshError
 from vhquad.field.align import AlignedField, AlignReport, AlignSettings, align_field
 from vhquad.field.cross import CrossField
 from vhquad.mesh.triangle import TriMesh
-from vhquad.quad.octaves import map_quads
 from vhquad.quad.sag import sizes_for_creases
 from vhquad.quad.seamless_map import SeamlessMap, solve_seamless_map
 from vhquad.watch import Watch
@@ -70,6 +69,8 @@ class MapInput:
     creases : (k, 2) int64
     target : int
         Quads.
+    quads : float
+        For which the map is made; it is scaled to the target.
     smoothing, cancel : float
         As in :class:`vhquad.field.align.AlignSettings`.
     seam : (3m,) bool or None
@@ -84,6 +85,7 @@ class MapInput:
     field: CrossField
     creases: Ints
     target: int
+    quads: float
     smoothing: float
     cancel: float
     seam: Bools | None
@@ -91,7 +93,7 @@ class MapInput:
     curving: float
 
     def solve(self, cache: bool, watch: Watch, tell: Callable[[str, float], None]) -> ContinuousMap:
-        """The map, taken from the cache if it was made before, for the octave of the target.
+        """The map for the target, scaled from the one that was made, or is kept.
 
         Raises
         ------
@@ -108,11 +110,11 @@ class MapInput:
                     write_arrays(path, _arrays(found))
         else:
             found = self._made(watch, tell)
-        return found.scaled(float(np.sqrt(map_quads(self.target) / self.target)))
+        return found.scaled(float(np.sqrt(self.quads / self.target)))
 
     def _key(self) -> str:
         optional = [self.field.size, self.field.confidence, self.seam]
-        numbers = [map_quads(self.target), self.smoothing, self.cancel]
+        numbers = [self.quads, self.smoothing, self.cancel]
         return content_key(
             [code_digest(), *numbers, self.size_weight, self.curving],
             [part is None for part in optional],
@@ -121,7 +123,7 @@ class MapInput:
         )
 
     def _made(self, watch: Watch, tell: Callable[[str, float], None]) -> ContinuousMap:
-        mesh, field, quads = self.mesh, self.field, map_quads(self.target)
+        mesh, field, quads = self.mesh, self.field, self.quads
         length = float(np.sqrt(mesh.area / quads))
         if field.size is not None:
             count = float((mesh.face_areas / field.size**2).sum())

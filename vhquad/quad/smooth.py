@@ -2,9 +2,10 @@
 
 Vertices descend a barrier energy that unfolds (:mod:`vhquad.quad.descent`); after each step they
 return to the surface or slide on their curve (:mod:`vhquad.quad.sliding`). Quads still poor get
-patch problems of their own; where some stay folded, vertices spread first in another attempt. At
-last those on curves go where edges keep nearest to the curves (:mod:`vhquad.quad.settle`). The best
-state met is returned: never more folded quads than came in.
+patch problems of their own; where some stay folded, vertices spread first in another attempt,
+around them or, if that is most of the mesh, everywhere. At last those on curves go where edges keep
+nearest to the curves (:mod:`vhquad.quad.settle`). The best state met is returned: never more folded
+quads than came in.
 """
 
 from __future__ import annotations
@@ -35,6 +36,8 @@ Bools = NDArray[np.bool_]
 SPREAD_ITERATIONS = 10
 POOR = 0.1  # a quad with a scaled Jacobian below this gets a patch problem of its own
 FOLDED_ROUNDS = ((4, 0), (4, 5), (4, 0))  # rings around, and steps of spreading
+FAR_RINGS = 12  # around quads still folded then
+LOCAL = 0.5  # of the quads at most, for another attempt around these alone
 POOR_ROUNDS = 2
 POOR_RINGS = 4
 PATCH_ITERATIONS = 40
@@ -121,9 +124,14 @@ def smooth_quads(
     state = _mended(problem, descend(problem, state, factor, iterations // 2), POOR)
     if state.folded.any():
         # Spreading opens what is crowded; not at first, since it drags quads out of thin parts.
-        other = spread(problem, start, factor, SPREAD_ITERATIONS)
-        other = _mended(problem, descend(problem, other, factor, iterations, PATIENCE), POOR)
-        state = other if better(other, state) else state
+        around = within_rings(q, state.folded, FAR_RINGS)
+        if around.mean() < LOCAL:
+            for patch in separate_parts(q, around):  # few
+                state = _solve_patch(problem, state, patch, SPREAD_ITERATIONS, guided=True)
+        else:
+            other = spread(problem, start, factor, SPREAD_ITERATIONS)
+            other = _mended(problem, descend(problem, other, factor, iterations, PATIENCE), POOR)
+            state = other if better(other, state) else state
     state = start if better(start, state) else state
     return settle_on_curves(problem, state, SETTLED).vertices
 

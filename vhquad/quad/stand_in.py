@@ -30,7 +30,7 @@ from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.shapely import shapely
 from vhquad.mesh.thinning import slim, thin_out
 from vhquad.mesh.triangle import TriMesh
-from vhquad.quad.octaves import middle_of_octave
+from vhquad.quad.counts import creased_map_quads, stand_in_quads
 
 __all__ = ["StandIn", "make_stand_in"]
 
@@ -90,7 +90,7 @@ def make_stand_in(
         In degrees; no creases if neither is given.
     cache : bool
         Keep the stand-in, and take one that was kept. It serves other numbers of quads of the
-        octave too.
+        class too (:mod:`vhquad.quad.counts`).
 
     Returns
     -------
@@ -98,8 +98,8 @@ def make_stand_in(
         None where the mesh is not much finer than its quads, or where decimation would not leave
         the topology, the borders and the creases as they are: the mesh then serves itself.
     """
-    middle = middle_of_octave(n_quads)  # hence 7 to 14 triangles a quad
-    budget = max(round(FACES_A_QUAD * middle), FEWEST_FACES)
+    # Hence 14 triangles a quad at the coarse end of a class, 3.5 at the fine end.
+    budget = max(round(FACES_A_QUAD * stand_in_quads(n_quads)), FEWEST_FACES)
     if mesh.n_faces < WORTH_FROM * budget:
         return None
     quads = budget / FACES_A_QUAD
@@ -119,7 +119,7 @@ def make_stand_in(
         return None
     copy, lines = found
     if creases is None and len(lines):
-        edge = float(np.sqrt(mesh.area / n_quads))
+        edge = float(np.sqrt(mesh.area / creased_map_quads(n_quads)))
         lines = drop_short_creases(copy, lines, TOGETHER * edge)
         lines = prune_branches(copy, lines, LOOSE * edge)
     return StandIn(copy, lines, mesh)
