@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -20,7 +22,7 @@ from vhquad.errors import MeshError
 from vhquad.mesh.closest import ClosestPoints, Hits
 from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.vectors import cross
-from vhquad.quad import descent
+from vhquad.quad import descent, smooth
 from vhquad.quad.aspects import smoothed_aspects
 from vhquad.quad.corners import ahead, behind, cross_rows
 from vhquad.quad.curves import CurveConstraints
@@ -33,7 +35,7 @@ from vhquad.quad.distortion import (
 )
 from vhquad.quad.embed import embed_layout
 from vhquad.quad.guide import FieldGuide
-from vhquad.quad.sliding import folded_quads
+from vhquad.quad.sliding import Problem, State, folded_quads
 from vhquad.quad.smooth import smooth_quads, smoothed_sizes
 
 NOBODY = np.zeros(0, dtype=np.int64)
@@ -103,6 +105,29 @@ def test_a_strip_squeezed_to_nothing_opens() -> None:
         np.roll(out.reshape(30, 12, 3), -1, axis=0) - out.reshape(30, 12, 3), axis=2
     )
     assert rung.min() > rung.mean() / 3
+
+
+def test_another_attempt_moves_what_is_near_a_fold_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where nothing else unfolds it, on a mesh that is good everywhere else."""
+    v, q = quad_grid(60, 60)
+    x = v.copy()
+    swapped = np.flatnonzero((v[:, 1] == 30) & np.isin(v[:, 0], [30, 31]))
+    x[swapped] = x[swapped[::-1]]
+    monkeypatch.setattr(smooth, "FOLDED_ROUNDS", ())
+    whole = smooth.descend
+
+    def descend(problem: Problem, state: State, *rest: Any) -> State:
+        return state if len(problem.quads) == len(q) else whole(problem, state, *rest)
+
+    monkeypatch.setattr(smooth, "descend", descend)
+    rim = (v[:, :2] % 60 == 0).any(axis=1)
+    up = np.tile([0.0, 0.0, 1.0], (len(q), 1))
+    assert folded_quads(x, q, up).sum() == 2
+    out = smooth_quads(x, q, ClosestPoints(triangulated((v, q))), rim)
+    assert not folded_quads(out, q, up).any()
+    far = np.abs(v[:, :2] - 30.5).max(axis=1) > 15
+    np.testing.assert_array_equal(out[far], v[far])
+    assert np.abs(out - v).max() < 0.05
 
 
 def test_flat_grid_comes_back_exactly() -> None:
