@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import vhquad
-from vhquad.learn.predict import PROXY_ABOVE, predict_field
+from vhquad.learn.predict import predict_field
+from vhquad.learn.proxy import PROXY_ABOVE
 from vhquad.nn.checkpoint import load_model
 
 TRUSTED = 0.8  # confidence

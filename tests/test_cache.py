@@ -12,6 +12,7 @@ import pytest
 from tests import meshes
 from vhquad import api, cache
 from vhquad.cache import code_digest, content_key, read_arrays, write_arrays
+from vhquad.learn import proxy
 from vhquad.mesh.triangle import TriMesh
 
 ARRAYS = {"a": np.arange(6.0).reshape(2, 3), "b": np.array([1, 2])}
@@ -95,6 +96,27 @@ def test_fields_are_predicted_once(
     entry.write_bytes(whole[: len(whole) // 2])
     again = api.predict(mesh, weights)
     assert np.array_equal(first.z, again.z)
+
+
+def test_the_network_is_asked_once_for_all_stand_ins(
+    weights: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(proxy, "PROXY_ABOVE", 2000)
+    monkeypatch.setattr(proxy, "PROXY_VERTICES", 900)
+    mesh = meshes.blob(4)
+    copies = [proxy.make_proxy(mesh, count) for count in (1800, 1400)]
+    first = [api.predict(copy, weights, of=mesh, cache=False) for copy in copies]
+    assert np.array_equal(api.predict(copies[0], weights, of=mesh).z, first[0].z)
+
+    def never(*args: object, **kwargs: object) -> None:
+        raise AssertionError("predicted again")
+
+    monkeypatch.setattr("vhquad.learn.predict.predict_field", never)
+    second = api.predict(copies[1], weights, of=mesh)
+    for name in ("z", "size", "confidence"):
+        assert np.array_equal(getattr(second, name), getattr(first[1], name))
+    with pytest.raises(AssertionError, match="predicted again"):
+        api.predict(copies[1], weights)
 
 
 def test_what_was_used_longest_ago_goes_and_nothing_that_is_not_ours(

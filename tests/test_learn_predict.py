@@ -14,8 +14,9 @@ from vhquad.errors import ConfigError, ModelError
 from vhquad.field.cross import CrossField
 from vhquad.geometry.frames import build_frames, from_3d, vertex_axes
 from vhquad.learn import predict as predict_module
+from vhquad.learn import proxy as proxy_module
 from vhquad.learn.predict import predict_field
-from vhquad.learn.proxy import carry_back, make_proxy
+from vhquad.learn.proxy import by_components, carry_back, make_proxy
 from vhquad.mesh.triangle import TriMesh
 from vhquad.nn.checkpoint import Model
 
@@ -82,8 +83,8 @@ def test_tiny_and_flat_parts_do_not_break_it(model: Model) -> None:
 def test_large_meshes_by_proxy(model: Model, monkeypatch: pytest.MonkeyPatch) -> None:
     """5. Above the limit a proxy is used; full resolution can be asked for."""
     mesh = blob(4)
-    monkeypatch.setattr(predict_module, "PROXY_ABOVE", 2000)
-    monkeypatch.setattr(predict_module, "PROXY_VERTICES", 1300)
+    monkeypatch.setattr(proxy_module, "PROXY_ABOVE", 2000)
+    monkeypatch.setattr(proxy_module, "PROXY_VERTICES", 1300)
     asked: list[int] = []
     build = predict_module.load_or_build
 
@@ -101,6 +102,36 @@ def test_large_meshes_by_proxy(model: Model, monkeypatch: pytest.MonkeyPatch) ->
     assert proxied.size is not None
     assert full.size is not None
     assert np.median(np.abs(np.log(proxied.size / full.size))) < 0.2
+
+
+def test_stand_ins_share_the_proxies_of_what_they_stand_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """5. Component by component; small components are answered as the stand-in has them."""
+    monkeypatch.setattr(proxy_module, "PROXY_ABOVE", 2000)
+    monkeypatch.setattr(proxy_module, "PROXY_VERTICES", 900)
+    ball, small = icosphere(4), moved(icosphere(3), (4.0, 0.0, 0.0))
+    whole = merge(ball, small)
+    coarse = make_proxy(ball, 1500)
+    assert coarse is not None
+    asked: list[tuple[str, TriMesh]] = []
+
+    def answer(kind: str, surface: TriMesh) -> CrossField:
+        asked.append((kind, surface))
+        n = surface.n_vertices
+        return CrossField("vertices", np.ones(n), np.full(n, 0.1), np.full(n, 0.7))
+
+    for copy in (merge(ball, small), merge(coarse, small)):
+        field = by_components(
+            copy, lambda part: answer("part", part), lambda part: answer("proxy", part), of=whole
+        )
+        assert len(field) == copy.n_vertices
+        np.testing.assert_allclose(np.abs(field.z), 1.0)
+        np.testing.assert_allclose(field.confidence, 0.7)
+    assert [kind for kind, _ in asked] == ["proxy", "part"] * 2
+    assert asked[0][1].n_vertices == pytest.approx(900, rel=0.1)
+    np.testing.assert_array_equal(asked[0][1].vertices, asked[2][1].vertices)
+    np.testing.assert_array_equal(asked[1][1].vertices, small.vertices)
 
 
 def test_carrying_back_loses_little() -> None:

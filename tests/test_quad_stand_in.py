@@ -9,6 +9,7 @@ import pytest
 
 from tests import meshes
 from vhquad import api
+from vhquad.field.cross import CrossField
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.triangle import TriMesh
 from vhquad.quad import remeshing, stand_in
@@ -161,7 +162,7 @@ def test_no_stand_in_where_the_mesh_itself_is_wanted(
     monkeypatch.setattr(stand_in, "FEWEST_FACES", 1000)
     made = remesh_predicted(
         mesh,
-        lambda surface: api.predict(surface, method="curvature"),
+        lambda surface, of: api.predict(surface, method="curvature"),
         RemeshSettings(target_quads=100, symmetry="x" if why == "symmetry" else "off"),
         stand_in=why != "full",
         with_uv=why == "map",
@@ -176,14 +177,14 @@ def test_what_cannot_be_mapped_on_a_stand_in_is_done_again(
     mesh = meshes.icosphere(4)
     monkeypatch.setattr(stand_in, "FEWEST_FACES", 1000)
     monkeypatch.setattr(remeshing, "GUESSED_QUADS", 20)  # the field asks for far more
-    field_sizes = []
+    asked = []
 
-    def field_of(surface: TriMesh):  # type: ignore[no-untyped-def]
-        field_sizes.append(surface.n_faces)
+    def field_of(surface: TriMesh, of: TriMesh | None) -> CrossField:
+        asked.append((surface is mesh, of is mesh))
         field = api.predict(surface, method="curvature")
         return type(field)(field.domain, field.z, np.full(len(field), 0.2), field.confidence)
 
     made = remesh_predicted(mesh, field_of, RemeshSettings())
-    assert len(field_sizes) == 2
+    assert asked == [(False, True), (True, False)]
     assert made.mesh is mesh
     assert made.result.report.stand_in is None

@@ -57,6 +57,7 @@ def predict(
     resolution: Literal["auto", "full"] = "auto",
     device: str = "auto",
     cache: bool = True,
+    of: TriMesh | None = None,
     progress: Progress | None = None,
 ) -> CrossField:
     """A cross at every vertex or face of a mesh, with the size of the quads wanted there.
@@ -77,6 +78,9 @@ def predict(
     cache : bool
         Keep the operators of the mesh and its field, and use those kept. Fields of a model that is
         given as an object are not kept.
+    of : TriMesh, optional
+        The mesh that this one is a decimated stand-in for: the network sees copies of that, the
+        same for all its stand-ins.
     progress : callable, optional
         Called with (what runs, share done).
 
@@ -102,20 +106,17 @@ def predict(
         if progress is not None:
             progress("predicting the field", done / count)
 
-    def make() -> CrossField:
-        from vhquad.learn.blend import lean_on_curvature
-        from vhquad.learn.predict import predict_field
+    from vhquad.learn.kept import predicted_field
 
-        field = predict_field(
-            mesh, model, resolution, device, cache=cache, on_component=on_component
-        )
-        return lean_on_curvature(mesh, field)
-
-    if not cache or not (model is None or isinstance(model, str | Path)):
-        return make()
-    from vhquad.learn.kept import kept_field
-
-    return kept_field(mesh, model, f"{resolution} {device}", make)
+    return predicted_field(
+        mesh,
+        model,
+        resolution=resolution,
+        device=device,
+        cache=cache,
+        of=of,
+        on_component=on_component,
+    )
 
 
 def remesh(
@@ -208,8 +209,10 @@ def remesh(
             progress=progress,
         )
 
-    def field_of(surface: TriMesh) -> CrossField:
-        return predict(surface, model, method=method, resolution=resolution, progress=progress)
+    def field_of(surface: TriMesh, of: TriMesh | None) -> CrossField:
+        return predict(
+            surface, model, method=method, resolution=resolution, of=of, progress=progress
+        )
 
     made = remesh_predicted(
         repaired.mesh,

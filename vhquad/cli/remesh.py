@@ -242,7 +242,7 @@ def remesh(
             )
         else:
 
-            def predicted(surface: TriMesh) -> CrossField:
+            def predicted(surface: TriMesh, of: TriMesh | None) -> CrossField:
                 return api.predict(
                     surface,
                     model,
@@ -250,6 +250,7 @@ def remesh(
                     resolution="full" if full_resolution else "auto",
                     device=device,
                     cache=not no_cache,
+                    of=of,
                     progress=progress,
                 )
 

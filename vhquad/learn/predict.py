@@ -11,18 +11,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from vhquad.errors import ConfigError, ModelError
+from vhquad.errors import ModelError
 from vhquad.field.cross import CrossField
 from vhquad.geometry.operators import OperatorSettings, load_or_build
 from vhquad.learn.confidence import agreement, confidence
 from vhquad.learn.device import choose_device
-from vhquad.learn.proxy import carry_back, make_proxy
+from vhquad.learn.proxy import Resolution, by_components
 from vhquad.mesh.triangle import TriMesh
 from vhquad.nn.checkpoint import Model, load_model
 from vhquad.nn.heads import LENGTH_UNIT
@@ -30,13 +29,9 @@ from vhquad.nn.inputs import NetworkInput, network_input, unstack
 from vhquad.nn.network import VectorHeatNet
 from vhquad.nn.settings import ModelSettings
 
-__all__ = ["PROXY_ABOVE", "Prediction", "Resolution", "predict_field", "predict_input"]
+__all__ = ["Prediction", "predict_field", "predict_input"]
 
-PROXY_ABOVE = 15_000  # vertices of a component
-PROXY_VERTICES = 10_000
 SMALLEST = 5e-4  # quad edge over sqrt(area): four million quads
-
-Resolution = Literal["auto", "full"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +72,7 @@ def predict_field(
     model : Model or path, optional
         The shipped model if not given.
     resolution : "auto" or "full"
-        "auto" predicts components above :data:`PROXY_ABOVE` vertices on a proxy.
+        "auto" predicts large components on a proxy, see :func:`vhquad.learn.proxy.by_components`.
     device : str
         "auto" takes CUDA where there is one.
     cache_dir, cache
@@ -100,8 +95,6 @@ def predict_field(
     ConfigError
         If an option is unknown or the device does not exist.
     """
-    if resolution not in ("auto", "full"):
-        raise ConfigError(f'resolution must be "auto" or "full", not {resolution!r}')
     chosen = model if isinstance(model, Model) else load_model(model)
     if chosen.settings.order != 4:
         raise ModelError(
@@ -109,8 +102,6 @@ def predict_field(
         )
     target = choose_device(device)
     network = chosen.network.to(target)
-    z = np.zeros(mesh.n_vertices, dtype=np.complex128)
-    size, trust = np.zeros(mesh.n_vertices), np.zeros(mesh.n_vertices)
 
     def on_surface(surface: TriMesh) -> CrossField:
         settings = operator_settings(chosen.settings)
@@ -127,28 +118,7 @@ def predict_field(
         trusted = confidence(surface, answer.agreement)
         return CrossField("vertices", answer.z, answer.size, trusted)
 
-    count = mesh.n_components
-    for label in range(count):  # components are few
-        if count == 1:
-            part, used = mesh, np.arange(mesh.n_vertices)
-        else:
-            part, used = mesh.submesh(mesh.face_component == label)
-        if part.area > 1e-24 * mesh.diagonal**2:
-            proxy = None
-            if resolution == "auto" and part.n_vertices > PROXY_ABOVE:
-                proxy = make_proxy(part, PROXY_VERTICES)
-            if proxy is None:
-                field = on_surface(part)
-            else:
-                field = carry_back(proxy, on_surface(proxy), part)
-            z[used] = field.z
-            if field.size is not None:
-                size[used] = field.size
-            if field.confidence is not None:
-                trust[used] = field.confidence
-        if on_component is not None:
-            on_component(label + 1, count)
-    return CrossField("vertices", z, size, trust)
+    return by_components(mesh, on_surface, on_surface, resolution, on_component=on_component)
 
 
 def predict_input(network: VectorHeatNet, mesh: NetworkInput) -> Prediction:

@@ -1,16 +1,88 @@
-"""A smaller stand-in for a large mesh, and the way back for a cross field predicted on it."""
+"""Prediction by components, large ones on a smaller proxy from which the field is carried back."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Literal
+
 import numpy as np
 
+from vhquad.errors import ConfigError
 from vhquad.field.cross import CrossField
 from vhquad.geometry.frames import build_frames, face_axes, from_3d, to_3d, vertex_axes
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.proxy import decimate
 from vhquad.mesh.triangle import TriMesh
 
-__all__ = ["carry_back", "make_proxy"]
+__all__ = ["PROXY_ABOVE", "Resolution", "by_components", "carry_back", "make_proxy"]
+
+PROXY_ABOVE = 15_000  # vertices of a component
+PROXY_VERTICES = 10_000
+
+Resolution = Literal["auto", "full"]
+
+
+def by_components(
+    mesh: TriMesh,
+    on_surface: Callable[[TriMesh], CrossField],
+    on_proxy: Callable[[TriMesh], CrossField],
+    resolution: Resolution = "auto",
+    of: TriMesh | None = None,
+    on_component: Callable[[int, int], None] | None = None,
+) -> CrossField:
+    """The field of a mesh from those of its components.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+    on_surface, on_proxy : callable
+        Give the field at the vertices of a component, or of the proxy of one.
+    resolution : "auto" or "full"
+        "auto" takes proxies of components above :data:`PROXY_ABOVE` vertices.
+    of : TriMesh, optional
+        What the mesh is a decimated stand-in for, with the same components: proxies are made of
+        that, so that all its stand-ins share them.
+    on_component : callable, optional
+        Called with (components done, components) after each.
+
+    Returns
+    -------
+    CrossField
+        On the vertices, with sizes and confidences. All is 0 on components without area.
+
+    Raises
+    ------
+    ConfigError
+        If the resolution is unknown.
+    """
+    if resolution not in ("auto", "full"):
+        raise ConfigError(f'resolution must be "auto" or "full", not {resolution!r}')
+    z = np.zeros(mesh.n_vertices, dtype=np.complex128)
+    size, trust = np.zeros(mesh.n_vertices), np.zeros(mesh.n_vertices)
+    count = mesh.n_components
+    for label in range(count):  # components are few
+        part, used = _component(mesh, label)
+        if part.area > 1e-24 * mesh.diagonal**2:
+            proxy = None
+            whole = part if of is None else _component(of, label)[0]
+            if resolution == "auto" and whole.n_vertices > PROXY_ABOVE:
+                proxy = make_proxy(whole, PROXY_VERTICES)
+            field = on_surface(part) if proxy is None else carry_back(proxy, on_proxy(proxy), part)
+            z[used] = field.z
+            if field.size is not None:
+                size[used] = field.size
+            if field.confidence is not None:
+                trust[used] = field.confidence
+        if on_component is not None:
+            on_component(label + 1, count)
+    return CrossField("vertices", z, size, trust)
+
+
+def _component(mesh: TriMesh, label: int) -> tuple[TriMesh, np.ndarray]:
+    """One component, and the vertices of the mesh that are its own."""
+    if mesh.n_components == 1:
+        return mesh, np.arange(mesh.n_vertices)
+    return mesh.submesh(mesh.face_component == label)
 
 
 def make_proxy(mesh: TriMesh, n_vertices: int) -> TriMesh | None:

@@ -32,7 +32,7 @@ class Predicted:
 
 def remesh_predicted(
     mesh: TriMesh,
-    field_of: Callable[[TriMesh], CrossField],
+    field_of: Callable[[TriMesh, TriMesh | None], CrossField],
     settings: RemeshSettings | None = None,
     *,
     creases: ArrayLike | None = None,
@@ -50,7 +50,7 @@ def remesh_predicted(
     ----------
     mesh : TriMesh
     field_of : callable
-        Gives the cross field of a mesh.
+        Gives the cross field of a mesh, told which mesh it stands for, if it is a stand-in.
     stand_in : bool
         Whether a decimated copy may take the place of the mesh. It never does where the map was
         asked for or a symmetry, and if no map is found on it, all is done again on the mesh.
@@ -73,7 +73,7 @@ def remesh_predicted(
             copy = make_stand_in(mesh, guess, given, settings.crease, cache)
     if copy is not None:
         with watch("field"):
-            cross = field_of(copy.mesh)
+            cross = field_of(copy.mesh, mesh)
         result = remesh_with(
             copy.mesh,
             cross,
@@ -90,7 +90,7 @@ def remesh_predicted(
         if report.asked <= 2 * guess and all(p.method != PAIRED for p in report.components):
             return Predicted(result, cross, copy.mesh)
     with watch("field"):
-        cross = field_of(mesh)
+        cross = field_of(mesh, None)
     result = remesh_with(
         mesh,
         cross,
