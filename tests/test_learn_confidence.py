@@ -10,7 +10,7 @@ from tests.meshes import blob, cube, icosphere, merge, moved, random_rigid, rela
 from vhquad import api
 from vhquad.errors import ModelError
 from vhquad.field.baseline import curvature_field
-from vhquad.field.cross import CrossField
+from vhquad.field.cross import SURE, CrossField
 from vhquad.field.transport import to_vertices
 from vhquad.learn.blend import blend, lean_on_curvature
 from vhquad.learn.confidence import FULL, NONE, agreement, confidence
@@ -115,7 +115,10 @@ def test_limits_of_the_blend() -> None:
     assert found.confidence is not None
     assert found.size is not None
     assert other.confidence is not None
-    np.testing.assert_allclose(found.confidence, other.confidence, atol=1e-9)
+    assert other.confidence.max() <= SURE
+    np.testing.assert_allclose(
+        found.confidence, np.minimum(other.confidence / SURE, SURE), atol=1e-9
+    )
     area = mesh.vertex_areas
     middle = area @ np.log(size) / area.sum()
     np.testing.assert_allclose(np.log(found.size) - middle, 0.5 * (np.log(size) - middle))
@@ -132,7 +135,7 @@ def test_blend_between() -> None:
     found = blend(
         mesh,
         CrossField("vertices", z, size, half),
-        CrossField("vertices", np.full(n, 1j), None, half),
+        CrossField("vertices", np.full(n, 1j), None, SURE * half),
     )
     assert found.z[0] == 0
     np.testing.assert_allclose(found.z[1:], (0.5 + 0.25j) / abs(0.5 + 0.25j))

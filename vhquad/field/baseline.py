@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vhquad.field.cross import CrossField
+from vhquad.field.cross import SURE, CrossField
 from vhquad.field.smooth import relaxed
 from vhquad.geometry.curvature import curvature_cross
 from vhquad.mesh.triangle import TriMesh
@@ -32,10 +32,12 @@ def curvature_field(mesh: TriMesh, length: float = LENGTH) -> CrossField:
     Returns
     -------
     CrossField
-        On faces, without sizes. The confidence is how much the curvature has to say at a face.
+        On faces, without sizes. The confidence is how much the curvature has to say at a face, and
+        never quite sure: its detail is noise as often as not.
     """
     cross = curvature_cross(mesh)
     weight = cross.face_weight * mesh.face_areas / (length**2 * mesh.area)
     z = relaxed(mesh, cross.face_z, weight)
     known = np.bincount(mesh.face_component, weight)[mesh.face_component] > 0
-    return CrossField("faces", z, None, np.clip(np.where(known, np.abs(z), 0.0), FAINT, 1.0))
+    said = SURE * np.where(known, np.abs(z), 0.0)
+    return CrossField("faces", z, None, np.clip(said, FAINT, SURE))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vhquad.errors import FieldError
 
-__all__ = ["CrossField", "Domain", "trust_in"]
+__all__ = ["SURE", "CrossField", "Domain", "trust_in"]
 
 Domain = Literal["vertices", "faces"]
 

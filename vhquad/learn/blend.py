@@ -1,7 +1,8 @@
 """Where a prediction is in doubt, the smooth curvature-aligned field takes over.
 
 ``z = c z_predicted + (1 - c) k z_curvature``, with the confidence c of the prediction and what the
-curvature has to say, k: on a plane or a sphere even a doubtful prediction decides.
+curvature has to say, k, of all that it can: on a plane or a sphere even a doubtful prediction
+decides.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vhquad.field.baseline import curvature_field
-from vhquad.field.cross import CrossField
+from vhquad.field.cross import SURE, CrossField
 from vhquad.field.transport import to_vertices
 from vhquad.mesh.triangle import TriMesh
 
@@ -43,15 +44,16 @@ def lean_on_curvature(mesh: TriMesh, field: CrossField) -> CrossField:
     return blend(mesh, field, to_vertices(mesh, curvature_field(mesh)))
 
 
-def blend(mesh: TriMesh, field: CrossField, other: CrossField) -> CrossField:
-    """Blend two fields on the vertices by their confidences; the second fills in.
+def blend(mesh: TriMesh, field: CrossField, curvature: CrossField) -> CrossField:
+    """Blend a predicted field and that of the curvature on the vertices by their confidences.
 
     Sizes of the first are evened out towards the geometric mean over the component where its
-    confidence is low.
+    confidence is low. The blend is no surer than the prediction and the curvature are.
     """
-    c, k = (np.ones(len(f)) if f.confidence is None else f.confidence for f in (field, other))
-    z = np.where(field.z != 0, c * field.z + (1.0 - c) * k * other.z, 0.0)
-    return CrossField("vertices", z, _evened(mesh, field, c), np.minimum(np.abs(z), 1.0))
+    c, k = (np.ones(len(f)) if f.confidence is None else f.confidence for f in (field, curvature))
+    z = np.where(field.z != 0, c * field.z + (1.0 - c) * (k / SURE) * curvature.z, 0.0)
+    trust = np.minimum(np.abs(z), c + (1.0 - c) * SURE)
+    return CrossField("vertices", z, _evened(mesh, field, c), trust)
 
 
 def _evened(mesh: TriMesh, field: CrossField, c: NDArray[np.float64]) -> NDArray[np.float64] | None:
