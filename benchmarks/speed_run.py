@@ -84,7 +84,7 @@ def main() -> None:
     for step, names in STEPS.items():
         for name in names:
             home, attribute = name.rsplit(".", 1)
-            if known and home.startswith("vhquad.learn."):
+            if known and home.startswith(("vhquad.learn.", "vhquad.nn.")):
                 continue
             module = importlib.import_module(home)
             setattr(module, attribute, clock.timed(step, getattr(module, attribute)))
