@@ -33,8 +33,9 @@ def lean_on_curvature(mesh: TriMesh, field: CrossField) -> CrossField:
     -------
     CrossField
         On the vertices. Its confidence is the modulus of the blend: 1 where the prediction is
-        certain, what the curvature has to say where that decides, less where the two contradict
-        each other. Crosses that were not predicted (0) stay unknown.
+        certain, what the curvature has to say where that decides (at most what curvature can be
+        sure of), less where the two contradict each other. Crosses that were not predicted (0) stay
+        unknown.
     """
     doubtful = field.z != 0
     if field.confidence is not None:
