@@ -16,14 +16,15 @@ aside for validation and two fifteenths for the test, as ``make_heads.py`` does.
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from box_model import Cage, Limb, Model, Unfit, box, ring
 from numpy.typing import ArrayLike, NDArray
+from quad_sets import Drawn, write_set
 
 from vhquad.learn.augment import deform
 from vhquad.mesh.intersections import self_intersections
@@ -694,28 +695,10 @@ def draw_kind(rng: Rng, kind: Callable[[Rng], Cage]) -> Model:
     return Model(2.0 * moved / np.ptp(moved, axis=0).max(), model.quads, mate, model.genus)
 
 
-def write_obj(path: Path, model: Model, kind: str) -> None:
-    """Write positions (seven decimals) and faces; the file appears whole or not at all."""
-    lines = [f"# random {kind}, box modelled, CC0 1.0"]
-    lines += [f"v {x:.7f} {y:.7f} {z:.7f}" for x, y, z in model.vertices]
-    lines += ["f " + " ".join(map(str, face)) for face in (model.quads + 1).tolist()]
-    partial = path.with_suffix(".partial")
-    partial.write_text("\n".join(lines) + "\n", encoding="ascii")
-    partial.replace(path)
-
-
-def make_set(folder: Path, count: int, seed: int) -> None:
-    """Write ``count`` creatures and the split into ``folder``; files that are there are kept."""
-    folder.mkdir(parents=True, exist_ok=True)
-    listed = folder / "split.json"  # may list others
-    split = json.loads(listed.read_text(encoding="ascii")) if listed.exists() else {}
-    for identity in range(count):
-        name = f"creature_{identity:04d}"
-        split[name] = {3: "val", 7: "test", 12: "test"}.get(identity % 15, "train")
-        path = folder / f"{name}.obj"
-        if not path.exists():
-            write_obj(path, *draw(identity, seed))
-    listed.write_text(json.dumps(split, indent=1) + "\n", encoding="ascii")
+def drawn(identity: int, seed: int) -> Drawn:
+    """A creature as ``write_set`` takes it."""
+    model, kind = draw(identity, seed)
+    return f"random {kind}, box modelled", model.vertices, model.quads
 
 
 def main() -> None:
@@ -724,7 +707,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=300, help="how many creatures (300)")
     parser.add_argument("--seed", type=int, default=0, help="another seed, others (0)")
     arguments = parser.parse_args()
-    make_set(arguments.folder, arguments.count, arguments.seed)
+    write_set(arguments.folder, "creature", arguments.count, partial(drawn, seed=arguments.seed))
 
 
 if __name__ == "__main__":

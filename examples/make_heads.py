@@ -18,7 +18,6 @@ The first start of anny takes a minute or two (it builds its data), later ones a
 from __future__ import annotations
 
 import argparse
-import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -29,6 +28,7 @@ import pymeshlab
 import torch
 from anny.face_segmentation import get_face_segmentation_mask
 from numpy.typing import NDArray
+from quad_sets import Drawn, write_obj, write_set
 
 from vhquad.learn.subdivide import catmull_clark
 from vhquad.learn.targets import isotropic_remesh, split_quads
@@ -36,6 +36,7 @@ from vhquad.learn.targets import isotropic_remesh, split_quads
 HEAD_PARTS = re.compile(r"^(head|forehead|eyebrows|mouth|nose|chin|neck|(l|r)-(eye|ear|cheek))-")
 CAVITIES = ["eye_cavity.L", "eye_cavity.R", "mouth_cavity"]
 SIDES = (("l-", "r-"), ("Left", "Right"))
+PERSON = "random person, anny (MakeHuman shapes)"
 SCAN_IDENTITY = 1_000_000  # never reached by --count
 SCAN_VERTICES = 13_000
 
@@ -120,30 +121,14 @@ def self_intersections(vertices: NDArray[np.float64], quads: NDArray[np.int64]) 
     return int(meshes.current_mesh().selected_face_number())
 
 
-def write_obj(path: Path, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
-    """Write positions (seven decimals) and faces; the file appears whole or not at all."""
-    lines = ["# random person, anny (MakeHuman shapes), CC0 1.0"]
-    lines += [f"v {x:.7f} {y:.7f} {z:.7f}" for x, y, z in vertices]
-    lines += ["f " + " ".join(map(str, face)) for face in (faces + 1).tolist()]
-    partial = path.with_suffix(".partial")
-    partial.write_text("\n".join(lines) + "\n", encoding="ascii")
-    partial.replace(path)
-
-
 def make_set(folder: Path, count: int, maker: HeadMaker) -> None:
     """Write ``count`` people and the split into ``folder``; files that are there are kept."""
-    folder.mkdir(parents=True, exist_ok=True)
-    listed = folder / "split.json"  # may list others
-    split = json.loads(listed.read_text(encoding="ascii")) if listed.exists() else {}
-    for identity in range(count):
-        name = f"{maker.kind}_{identity:04d}"
-        place = identity % 15
-        split[name] = {3: "val", 7: "test", 12: "test"}.get(place, "train")
-        path = folder / f"{name}.obj"
-        if not path.exists():
-            vertices, quads, _ = maker.draw(identity)
-            write_obj(path, vertices, quads)
-    listed.write_text(json.dumps(split, indent=1) + "\n", encoding="ascii")
+
+    def draw(identity: int) -> Drawn:
+        vertices, quads, _ = maker.draw(identity)
+        return PERSON, vertices, quads
+
+    write_set(folder, maker.kind, count, draw)
 
 
 def make_scan(path: Path, seed: int) -> None:
@@ -152,7 +137,7 @@ def make_scan(path: Path, seed: int) -> None:
     fine = catmull_clark(vertices, quads)
     triangles, _, _ = split_quads(fine.quads, np.random.default_rng(seed))
     mesh = isotropic_remesh(fine.vertices, triangles, SCAN_VERTICES)
-    write_obj(path, 10.0 * mesh.vertices, mesh.faces)  # decimetres
+    write_obj(path, (PERSON, 10.0 * mesh.vertices, mesh.faces))  # decimetres
 
 
 def main() -> None:

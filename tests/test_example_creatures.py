@@ -43,8 +43,9 @@ def tool() -> Iterator[ModuleType]:
 
 @pytest.fixture(scope="module")
 def maker(tool: ModuleType) -> Iterator[ModuleType]:
+    load("quad_sets")
     yield load("make_creatures")
-    del sys.modules["make_creatures"]
+    del sys.modules["make_creatures"], sys.modules["quad_sets"]
 
 
 def checked(model) -> QuadMesh:  # type: ignore[no-untyped-def]
