@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -132,6 +133,34 @@ def test_stand_ins_share_the_proxies_of_what_they_stand_for(
     assert asked[0][1].n_vertices == pytest.approx(900, rel=0.1)
     np.testing.assert_array_equal(asked[0][1].vertices, asked[2][1].vertices)
     np.testing.assert_array_equal(asked[1][1].vertices, small.vertices)
+
+
+def test_what_cannot_be_decimated_so_far_takes_its_stand_in(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """5. A proxy of the stand-in then, or the stand-in itself."""
+    monkeypatch.setattr(proxy_module, "PROXY_ABOVE", 1000)
+    monkeypatch.setattr(proxy_module, "PROXY_VERTICES", 500)
+    ball = icosphere(4)
+    copy = make_proxy(ball, 1500)
+    assert copy is not None
+    for refused, kind in (((ball,), "proxy"), ((ball, copy), "part")):
+        monkeypatch.setattr(
+            proxy_module,
+            "make_proxy",
+            lambda mesh, n, refused=refused: (
+                None if any(mesh is one for one in refused) else make_proxy(mesh, n)
+            ),
+        )
+        asked: list[str] = []
+
+        def answer(how: str, surface: TriMesh, asked: list[str] = asked) -> CrossField:
+            asked.append(how)
+            n = surface.n_vertices
+            return CrossField("vertices", np.ones(n), np.full(n, 0.1), np.ones(n))
+
+        by_components(copy, partial(answer, "part"), partial(answer, "proxy"), of=ball)
+        assert asked == [kind]
 
 
 def test_carrying_back_loses_little() -> None:

@@ -41,7 +41,8 @@ def by_components(
         "auto" takes proxies of components above :data:`PROXY_ABOVE` vertices.
     of : TriMesh, optional
         What the mesh is a decimated stand-in for, with the same components: proxies are made of
-        that, so that all its stand-ins share them.
+        that, so that all its stand-ins share them, or, if it cannot be decimated so far, of the
+        stand-in.
     on_component : callable, optional
         Called with (components done, components) after each.
 
@@ -64,9 +65,9 @@ def by_components(
         part, used = _component(mesh, label)
         if part.area > 1e-24 * mesh.diagonal**2:
             proxy = None
-            whole = part if of is None else _component(of, label)[0]
-            if resolution == "auto" and whole.n_vertices > PROXY_ABOVE:
-                proxy = make_proxy(whole, PROXY_VERTICES)
+            for source in (part,) if of is None else (_component(of, label)[0], part):
+                if resolution == "auto" and proxy is None and source.n_vertices > PROXY_ABOVE:
+                    proxy = make_proxy(source, PROXY_VERTICES)
             field = on_surface(part) if proxy is None else carry_back(proxy, on_proxy(proxy), part)
             z[used] = field.z
             if field.size is not None:
