@@ -14,7 +14,7 @@ from tests.remesh_checks import plain_field
 from vhquad.mesh.triangle import TriMesh
 from vhquad.quad import continuous
 from vhquad.quad.continuous import ContinuousMap, MapInput
-from vhquad.quad.counts import creased_map_quads, map_quads, stand_in_quads
+from vhquad.quad.counts import map_quads, narrow_map_quads, stand_in_quads
 from vhquad.quad.pipeline import RemeshResult, RemeshSettings, remesh_mesh
 from vhquad.watch import Watch
 
@@ -34,7 +34,7 @@ def _run(mesh: TriMesh, count: int, cache: bool) -> RemeshResult:
 
 @pytest.mark.parametrize(
     ("span", "made_for"),
-    [(4.0, lambda n: map_quads(n, 1e9)), (2.0, creased_map_quads)],
+    [(4.0, lambda n: map_quads(n, 1e9)), (2.0, narrow_map_quads)],
     ids=["smooth", "creased"],
 )
 def test_classes(span: float, made_for: Callable[[float], float]) -> None:

@@ -28,7 +28,7 @@ from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.triangle import TriMesh
 from vhquad.quad.continuous import MapInput
-from vhquad.quad.counts import creased_map_quads, map_quads
+from vhquad.quad.counts import map_quads, narrow_map_quads
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.embed import embed_layout
 from vhquad.quad.fallback import triangles_to_quads
@@ -142,7 +142,7 @@ class Component:
     seam : (3m,) bool or None
         As in :func:`vhquad.field.align.align_field`.
     size_weight : float
-        As in :func:`vhquad.quad.seamless_map.solve_seamless_map`.
+        As in :func:`vhquad.quad.seamless_map.solve_seamless_map`; 1 for a density to be followed.
     adaptivity : float
         How far sizes follow curved creases, 0 to 1.
     cache : bool
@@ -168,10 +168,11 @@ class Component:
         """
         tried: set[tuple[float, bytes]] = set()
         for attempt in _ATTEMPTS:
-            quads = creased_map_quads(self.target)
+            quads = narrow_map_quads(self.target)
             creases = self._creases(attempt, quads)
             shared = map_quads(self.target, self.mesh.n_faces)
-            if shared != quads and self.curving(creases) == 0:
+            free = self.size_weight < 1.0 and self.curving(creases) == 0
+            if free and shared != quads:
                 quads, creases = shared, self._creases(attempt, shared)
             key = (attempt.smoothing, creases.tobytes())
             if key not in tried:

@@ -1,19 +1,19 @@
 """Numbers of quads in classes: what is made for one number of a class serves all of them.
 
-A class goes from some number of quads to four times as many, or to twice as many on parts that
-follow creases. 7,071 is where classes of either kind begin.
+A class goes from some number of quads to four times as many, or to twice as many where creases or a
+density are followed. 7,071 is where classes of either kind begin.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["creased_map_quads", "map_quads", "stand_in_quads"]
+__all__ = ["map_quads", "narrow_map_quads", "stand_in_quads"]
 
 SPAN = 4.0
-CREASED_SPAN = 2.0
+NARROW_SPAN = 2.0
 """On parts that follow creases: which to keep, and how far they bound sizes, goes with the size of
-quads."""
+quads. And where a density was asked for: the turns that it needs must not be smoothed away."""
 MAPPED = 8_000.0
 """For so many quads of the class from 7,071 on, and as much of the others, maps are made. Fields
 are smoothed by the size of quads: a map suits the coarse end of its class, and is smoother than
@@ -38,9 +38,9 @@ def map_quads(n_quads: float, n_faces: float) -> float:
     return MAPPED * _times(min(n_quads, max(n_faces / FACES, FEWEST)), SPAN)
 
 
-def creased_map_quads(n_quads: float) -> float:
-    """The same on parts that follow creases."""
-    return MAPPED * _times(n_quads, CREASED_SPAN)
+def narrow_map_quads(n_quads: float) -> float:
+    """The same where creases or a density are followed."""
+    return MAPPED * _times(n_quads, NARROW_SPAN)
 
 
 def stand_in_quads(n_quads: float) -> float:

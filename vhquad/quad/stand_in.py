@@ -30,7 +30,7 @@ from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.shapely import shapely
 from vhquad.mesh.thinning import slim, thin_out
 from vhquad.mesh.triangle import TriMesh
-from vhquad.quad.counts import creased_map_quads, stand_in_quads
+from vhquad.quad.counts import narrow_map_quads, stand_in_quads
 
 __all__ = ["StandIn", "make_stand_in"]
 
@@ -119,7 +119,7 @@ def make_stand_in(
         return None
     copy, lines = found
     if creases is None and len(lines):
-        edge = float(np.sqrt(mesh.area / creased_map_quads(n_quads)))
+        edge = float(np.sqrt(mesh.area / narrow_map_quads(n_quads)))
         lines = drop_short_creases(copy, lines, TOGETHER * edge)
         lines = prune_branches(copy, lines, LOOSE * edge)
     return StandIn(copy, lines, mesh)
