@@ -110,6 +110,30 @@ def test_walks_stay_on_their_sheet() -> None:
     assert surface.query([[-0.2, 0.1, -0.02]]).point[0, 2] == pytest.approx(-0.005)
 
 
+@pytest.mark.parametrize("case", EVERY, ids=str)
+def test_a_face_known_before_changes_no_answer(case: Case, rng: np.random.Generator) -> None:
+    m = case.mesh
+    surface = ClosestPoints(m)
+    p = m.vertices.mean(axis=0) + rng.normal(size=(50, 3)) * m.diagonal / 3
+    on = surface.query(p)
+    near = on.point + 0.01 * m.diagonal * rng.normal(size=(50, 3))
+    for start in (on.face, rng.integers(m.n_faces, size=50)):  # right, close by, or anywhere
+        np.testing.assert_allclose(surface.query_from(p, start).distance, on.distance, atol=1e-12)
+    hits = surface.query_from(near, on.face)
+    np.testing.assert_allclose(hits.distance, surface.distance(near), rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(hits.interpolate(m.vertices[m.faces]), hits.point, atol=1e-14)
+
+
+def test_a_face_known_before_keeps_its_side_of_a_thin_slab() -> None:
+    box = meshes.cube(2)
+    slab = TriMesh(box.vertices * [1.0, 1.0, 0.01], box.faces)
+    surface = ClosestPoints(slab)
+    top = surface.query([[-0.2, 0.1, 1.0]])
+    below = [[-0.2, 0.1, -0.02]]
+    assert surface.query_from(below, top.face).point[0, 2] == pytest.approx(0.005)
+    assert surface.query(below).point[0, 2] == pytest.approx(-0.005)
+
+
 def test_walks_on_a_sphere_end_at_the_closest_point(rng: np.random.Generator) -> None:
     mesh = meshes.icosphere(3)
     surface = ClosestPoints(mesh)

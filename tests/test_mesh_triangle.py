@@ -65,6 +65,7 @@ def test_right_triangle_by_hand() -> None:
     assert m.area == 0.5
     np.testing.assert_allclose(m.corner_angles, [[np.pi / 2, np.pi / 4, np.pi / 4]], atol=1e-15)
     np.testing.assert_allclose(m.edge_lengths, [[1, np.sqrt(2), 1]])
+    np.testing.assert_allclose(m.face_altitudes, [[np.sqrt(0.5), 1, 1]])
     np.testing.assert_allclose(m.vertex_areas, np.full(3, 1 / 6))
     np.testing.assert_array_equal(m.vertex_normals, [[0, 0, 1]] * 3)
     assert m.diagonal == pytest.approx(np.sqrt(2))

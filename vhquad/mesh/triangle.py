@@ -301,6 +301,13 @@ class TriMesh:
         )
 
     @cached_property
+    def face_altitudes(self) -> Floats:
+        """Distance of corner k of each face from the opposite edge; (m, 3)."""
+        opposite = np.roll(self.edge_lengths, -1, axis=1)
+        twice = np.repeat(2.0 * self.face_areas, 3).reshape(-1, 3)
+        return np.divide(twice, opposite, out=np.zeros_like(twice), where=opposite > 0)
+
+    @cached_property
     def corner_angles(self) -> Floats:
         """Interior angle at corner k of each face, radians; (m, 3)."""
         p = self.vertices[self.faces]

@@ -133,7 +133,7 @@ def place(problem: Problem, wanted: Floats, before: State | None) -> State:
         x[problem.fixed] = wanted[problem.fixed]
     else:
         free = np.flatnonzero(~problem.fixed)
-        hits = problem.surface.query(wanted[free])
+        hits = problem.surface.query_from(wanted[free], before.face[free])
         x, face, normals = before.vertices.copy(), before.face.copy(), before.normals.copy()
         x[free], face[free], normals[free] = hits.point, hits.face, smooth_normals(problem, hits)
         along = np.einsum("vi,vi->v", wanted[line] - before.vertices[line], before.tangents)

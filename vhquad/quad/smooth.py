@@ -51,7 +51,7 @@ def smooth_quads(
     surface: ClosestPoints,
     fixed: ArrayLike | None = None,
     curves: CurveConstraints | None = None,
-    iterations: int = 60,
+    iterations: int = 40,
     target_edge: ArrayLike | None = None,
     guide: FieldGuide | None = None,
 ) -> Floats:
