@@ -1,7 +1,8 @@
-"""Running vhquad's commands in tests: in this process, or as a program of its own."""
+"""Running vhquad's commands and scripts in tests: in this process, or as a program of its own."""
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import subprocess
 import sys
@@ -9,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -78,6 +80,18 @@ def program(*arguments: str | Path, cwd: Path | None = None) -> Iterator[subproc
     finally:
         process.kill()
         process.communicate()
+
+
+def load_script(path: str) -> ModuleType:
+    """A script of the repository as a module, under the name of its file."""
+    name = Path(path).stem
+    spec = importlib.util.spec_from_file_location(name, ROOT / path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses look their module up
+    spec.loader.exec_module(module)
+    return module
 
 
 def write_obj(path: Path, vertices: ArrayLike, faces: ArrayLike) -> Path:

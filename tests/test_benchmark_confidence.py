@@ -2,30 +2,16 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-from types import ModuleType
-
 import numpy as np
 import pytest
 
-from tests.command_line import ROOT
-
-
-def load(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, ROOT / "benchmarks" / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # dataclasses look their module up
-    spec.loader.exec_module(module)
-    return module
+from tests.command_line import load_script
 
 
 @pytest.mark.parametrize("kind", ["neck", "mask"])
 def test_crops_take_off_what_they_say(kind: str) -> None:
     """1. The lowest goes, the top stays; a mask besides is the front. Units do not matter."""
-    crop = load("head_crops").crop
+    crop = load_script("benchmarks/head_crops.py").crop
     rng = np.random.default_rng(0)
     x = rng.random((4000, 3)) * [3.0, 5.0, 7.0] - 2.0
     areas = np.ones(len(x))
@@ -41,7 +27,7 @@ def test_crops_take_off_what_they_say(kind: str) -> None:
 
 def test_the_fit_finds_what_tells_right_from_wrong() -> None:
     """2. A model that is right where it agrees with itself: trusted there, and only there."""
-    fit = load("fit_confidence")
+    fit = load_script("benchmarks/fit_confidence.py")
     rng = np.random.default_rng(0)
     truth, wrong = np.exp(2j * np.pi * rng.random((2, 500)))
     rough = truth * np.exp(1j * rng.normal(0.0, 0.8, 500))

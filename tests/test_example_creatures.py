@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import sys
 from collections.abc import Iterator
@@ -12,7 +11,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from tests.command_line import ROOT
+from tests.command_line import load_script
 from vhquad.learn.subdivide import catmull_clark
 from vhquad.mesh.intersections import self_intersections
 from vhquad.mesh.io import read_polygons
@@ -25,26 +24,16 @@ KINDS = (
 UP = np.array([0.0, 1.0, 0.0])
 
 
-def load(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, ROOT / "examples" / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # dataclasses look their module up
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.fixture(scope="module")
 def tool() -> Iterator[ModuleType]:
-    yield load("box_model")
+    yield load_script("examples/box_model.py")
     del sys.modules["box_model"]
 
 
 @pytest.fixture(scope="module")
 def maker(tool: ModuleType) -> Iterator[ModuleType]:
-    load("quad_sets")
-    yield load("make_creatures")
+    load_script("examples/quad_sets.py")
+    yield load_script("examples/make_creatures.py")
     del sys.modules["make_creatures"], sys.modules["quad_sets"]
 
 

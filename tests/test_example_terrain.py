@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-import importlib.util
 import sys
 from types import ModuleType
 
 import numpy as np
 import pytest
 
-from tests.command_line import ROOT
+from tests.command_line import load_script
 
 
 @pytest.fixture(scope="module")
 def example() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("terrain", ROOT / "examples" / "terrain.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["terrain"] = module  # dataclasses look their module up
-    spec.loader.exec_module(module)
-    return module
+    return load_script("examples/terrain.py")
 
 
 def test_the_truth_leads_to_the_summit(example: ModuleType) -> None:

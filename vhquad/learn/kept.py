@@ -22,7 +22,7 @@ from vhquad.nn.files import model_file
 if TYPE_CHECKING:
     from vhquad.nn.checkpoint import Model
 
-__all__ = ["kept_field", "predicted_field"]
+__all__ = ["predicted_field"]
 
 _ARRAYS = ("z", "size", "confidence")
 _KINDS = (np.dtype(np.complex128), np.dtype(np.float64), np.dtype(np.float64))
@@ -58,7 +58,7 @@ def predicted_field(
         surface: TriMesh, what: str, make: Callable[[], CrossField], of: TriMesh | None = None
     ) -> CrossField:
         if cache and (model is None or isinstance(model, str | Path)):
-            return kept_field(surface, model, f"{what} {device}", make, of)
+            return _kept(surface, model, f"{what} {device}", make, of)
         return make()
 
     def ask_once(proxy: TriMesh) -> CrossField:
@@ -71,7 +71,7 @@ def predicted_field(
     return keep(mesh, resolution, make, of)
 
 
-def kept_field(
+def _kept(
     mesh: TriMesh,
     model: Path | str | None,
     how: str,

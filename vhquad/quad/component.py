@@ -40,7 +40,7 @@ from vhquad.quad.limbs import Covering, polished_onto_limbs
 from vhquad.quad.motorcycle import Tracing, trace
 from vhquad.quad.parts import Part, UvMap
 from vhquad.quad.quantize import quantise
-from vhquad.quad.seamless_map import SeamlessMap
+from vhquad.quad.seamless_map import SIZE_WEIGHT, SeamlessMap
 from vhquad.quad.smooth import smooth_quads
 from vhquad.quad.tips import put_on_tips
 from vhquad.quad.tmesh import build_tmesh
@@ -141,8 +141,8 @@ class Component:
     crease_angle : float or None
     seam : (3m,) bool or None
         As in :func:`vhquad.field.align.align_field`.
-    size_weight : float
-        As in :func:`vhquad.quad.seamless_map.solve_seamless_map`; 1 for a density to be followed.
+    density : bool
+        Whether the sizes follow a density that was asked for.
     adaptivity : float
         How far sizes follow curved creases, 0 to 1.
     cache : bool
@@ -157,7 +157,7 @@ class Component:
     creases: Ints | None
     crease_angle: float | None
     seam: Bools | None
-    size_weight: float
+    density: bool
     adaptivity: float
     cache: bool
 
@@ -171,7 +171,7 @@ class Component:
             quads = narrow_map_quads(self.target)
             creases = self._creases(attempt, quads)
             shared = map_quads(self.target, self.mesh.n_faces)
-            free = self.size_weight < 1.0 and self.curving(creases) == 0
+            free = not self.density and self.curving(creases) == 0
             if free and shared != quads:
                 quads, creases = shared, self._creases(attempt, shared)
             key = (attempt.smoothing, creases.tobytes())
@@ -292,7 +292,7 @@ def _by_map(
         smoothing=attempt.smoothing,
         cancel=attempt.cancel,
         seam=wish.seam,
-        size_weight=wish.size_weight,
+        size_weight=1.0 if wish.density else SIZE_WEIGHT,  # who asks for a density wants it
         curving=wish.curving(creases),
     )
     continuous = wanted.solve(wish.cache, watch, tell)

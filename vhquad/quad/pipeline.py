@@ -20,7 +20,6 @@ from vhquad.mesh.quality import check_quads
 from vhquad.mesh.triangle import TriMesh
 from vhquad.quad.component import Component, Progress, remesh_component
 from vhquad.quad.parts import Part, UvMap, join_quads, join_uv
-from vhquad.quad.seamless_map import SIZE_WEIGHT
 from vhquad.quad.sizing import checked_density, wanted_sizes
 from vhquad.quad.symmetric import SYMMETRIES, find_plane, remesh_mirrored
 from vhquad.report import MeshCounts, RemeshReport, SymmetryReport
@@ -164,7 +163,7 @@ def remesh_mesh(
     wish = _Wish(
         settings=settings,
         scale=wanted.scale,
-        size_weight=SIZE_WEIGHT if factor is None else 1.0,  # who asks for a density wants it
+        density=factor is not None,
         with_uv=with_uv,
         cache=cache,
         progress=progress,
@@ -200,15 +199,15 @@ class _Wish:
     settings : RemeshSettings
     scale : float
         What makes edge lengths of the sizes of the field.
-    size_weight : float
-        As in :func:`vhquad.quad.seamless_map.solve_seamless_map`.
+    density : bool
+        Whether the sizes follow a density that was asked for.
     with_uv, cache, progress
         As in :func:`remesh_mesh`.
     """
 
     settings: RemeshSettings
     scale: float
-    size_weight: float
+    density: bool
     with_uv: bool
     cache: bool
     progress: Progress | None
@@ -297,7 +296,7 @@ def _remesh_parts(
                     creases=own,
                     crease_angle=settings.crease,
                     seam=edge,
-                    size_weight=wish.size_weight,
+                    density=wish.density,
                     adaptivity=settings.adaptivity,
                     cache=wish.cache,
                 ),
