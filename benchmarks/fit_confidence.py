@@ -5,7 +5,8 @@
 Takes samples that training did not see, of shapes like and unlike those that it saw. Tries
 constants on a grid, blends prediction and curvature-aligned field by them, prints the best: whose
 loss, in ratio to the better of the two fields alone, is least on average over the groups of samples
-(heads by variant, other shapes one by one), no group being much above 1. Write them into
+(heads by variant, numbered shapes of a set together, others one by one), no group being much above
+1. Write them into
 ``vhquad/learn/confidence.py``, then measure with ``vhquad evaluate`` on the test split.
 """
 
@@ -13,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import itertools
+import re
 import sys
 from collections import defaultdict
 from dataclasses import dataclass
@@ -34,6 +36,7 @@ SHAPE = (0.0, 0.3, 0.5, 0.7)
 NONE = (0.2, 0.4, 0.5, 0.6, 0.7, 0.8)
 FULL = (0.85, 0.9, 0.95, 0.98)
 POWER = (1, 2, 3)
+NUMBER = re.compile(r"_\d{4}$")  # of a shape in a set that examples/ makes
 DRAWN = 500  # vertices a sample, by weight
 WORST = 0.5  # how much the worst group counts beside the mean
 
@@ -65,6 +68,12 @@ class Drawn:
         return float(1.0 - (_unit(field) * self.truth.conj()).real.mean())
 
 
+def group(entry: SampleEntry) -> str:
+    """Heads by variant, numbered shapes of other sets together, any other shape by itself."""
+    kind = NUMBER.sub("", entry.shape)
+    return f"{kind}, {entry.variant.split('+')[-1]}" if kind == "head" else kind
+
+
 def draw(network: VectorHeatNet, dataset: Dataset, entry: SampleEntry) -> Drawn:
     """Predict one sample."""
     mesh, truth = dataset.mesh(entry), dataset.truth_field(entry)
@@ -75,9 +84,8 @@ def draw(network: VectorHeatNet, dataset: Dataset, entry: SampleEntry) -> Drawn:
     weight = mass * (1.0 if truth.confidence is None else truth.confidence)
     chosen = np.random.default_rng(0).choice(len(mass), DRAWN, p=weight / weight.sum())
     k = np.ones(len(mass)) if other.confidence is None else other.confidence
-    head = entry.shape.startswith("head")
     return Drawn(
-        group=f"heads, {entry.variant.split('+')[-1]}" if head else entry.shape,
+        group=group(entry),
         model=_unit(answer.z)[chosen],
         other=(k * _unit(other.z))[chosen],
         truth=_unit(truth.z)[chosen],
