@@ -76,7 +76,8 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=24, help="heads (24)")
     arguments = parser.parse_args()
     split = json.loads((arguments.folder / "split.json").read_text(encoding="utf-8"))
-    test = [name for name in sorted(split) if split[name] == "test"][: arguments.count]
+    heads = [name for name in sorted(split) if name.startswith("head_")]  # bodies may be there too
+    test = [name for name in heads if split[name] == "test"][: arguments.count]
     settings = PreprocessSettings()
     (arguments.out / "samples").mkdir(parents=True, exist_ok=True)
     entries = tuple(
