@@ -5,9 +5,9 @@
 Takes samples that training did not see, of shapes like and unlike those that it saw. Tries
 constants on a grid, blends prediction and curvature-aligned field by them, prints the best: whose
 loss, in ratio to the better of the two fields alone, is least on average over the groups of samples
-(heads by variant, numbered shapes of a set together, others one by one), no group being much above
-1. Write them into
-``vhquad/learn/confidence.py``, then measure with ``vhquad evaluate`` on the test split.
+(heads by variant, numbered shapes of a set together, others one by one), with no group much worse
+than by the better field. Write them into ``vhquad/learn/confidence.py``, then measure with ``vhquad
+evaluate`` on the test split.
 """
 
 from __future__ import annotations

@@ -5,8 +5,9 @@ network was trained on, and drift apart on others. Agreement costs nothing, sinc
 there. (Other small changes, as fewer eigenvectors, features and times as of a cropped or extended
 shape, features left out, told the same story less clearly of an earlier model.)
 
-The constants are fitted to the shipped model by ``benchmarks/fit_confidence.py``, on validation
-heads and on two shapes other than heads; see ``models/README.md`` for the figures on others.
+The constants were fitted to an earlier state of the shipped model by
+``benchmarks/fit_confidence.py``, on validation heads and on two shapes other than heads; see
+``models/README.md`` for the figures on others, with the present one.
 """
 
 from __future__ import annotations
