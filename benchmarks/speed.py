@@ -34,6 +34,7 @@ SECOND = {"second, more": 1.3, "second, fewer": 1 / 1.3, "second, twice": 2.0, "
 FIELD_TO_QUADS = (
     "stand-in", "polish of the field", "map", "quantise", "embedding", "smoothing", "limbs",
     "unfolding",
+    "creases",
 )  # fmt: skip
 EXTRA = {10_000: 8_000}  # quads that peers make as well: what QuadriFlow takes there is a bar
 Result = dict[str, Any]

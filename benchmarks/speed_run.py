@@ -38,6 +38,7 @@ STEPS = {
     "smoothing": ["vhquad.quad.component.smooth_quads"],
     "limbs": ["vhquad.quad.component.polished_onto_limbs"],
     "unfolding": ["vhquad.quad.component.lifted"],
+    "creases": ["vhquad.quad.component.attach_to_creases", "vhquad.quad.component.straddled"],
     "report": ["vhquad.quad.pipeline.check_quads"],
     "write": ["vhquad.mesh.io.write_quad_mesh"],
 }

@@ -4,9 +4,10 @@ The field is aligned and turned into a seamless map (:mod:`vhquad.quad.continuou
 rectangles (:mod:`vhquad.quad.tmesh`), quantised (:mod:`vhquad.quad.quantize`), laid on the surface
 (:mod:`vhquad.quad.embed`), polished (:mod:`vhquad.quad.smooth`) with tips held
 (:mod:`vhquad.quad.tips`) and no limb laid bare (:mod:`vhquad.quad.limbs`), and freed of the last
-folds (:mod:`vhquad.quad.lift`). Where no valid map is found the field is smoothed further, then
-creases are given up, and at last triangles paired
-(:mod:`vhquad.quad.fallback`).
+folds (:mod:`vhquad.quad.lift`). At last edges come as near to creases as they can: to those that
+the layout left out (:mod:`vhquad.quad.attach`) and to those it follows
+(:mod:`vhquad.quad.straddle`). Where no valid map is found the field is smoothed further, then
+creases are given up, and at last triangles paired (:mod:`vhquad.quad.fallback`).
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from vhquad.field.grow import are_mostly_creases
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.triangle import TriMesh
+from vhquad.quad.attach import attach_to_creases
 from vhquad.quad.continuous import MapInput
 from vhquad.quad.counts import map_quads, narrow_map_quads
 from vhquad.quad.curves import CurveConstraints
@@ -42,6 +44,7 @@ from vhquad.quad.parts import Part, UvMap
 from vhquad.quad.quantize import quantise
 from vhquad.quad.seamless_map import SIZE_WEIGHT, SeamlessMap
 from vhquad.quad.smooth import smooth_quads
+from vhquad.quad.straddle import straddled
 from vhquad.quad.tips import put_on_tips
 from vhquad.quad.tmesh import build_tmesh
 from vhquad.report import MAP, ComponentReport, MeshCounts
@@ -69,6 +72,7 @@ class _Mapped:
     tracing: Tracing
     layout: Layout
     method: str
+    creases: Ints
 
     def miss(self, target: int) -> float:
         """How far the count is off, as the logarithm of a factor."""
@@ -186,14 +190,25 @@ class Component:
     def curving(self, creases: Ints) -> float:
         """How far sizes follow these creases where they are curved.
 
-        Only where there are any, and they were given, or most of what is sharp are creases:
-        elsewhere the doubtful ones would take the quads that shapes need.
+        Only on designed parts, where there are any, and they were given, or most of what is sharp
+        are creases: elsewhere the doubtful ones would take the quads that shapes need.
         """
-        if len(creases) == 0:
-            return 0.0
-        if self.creases is None and not are_mostly_creases(self.mesh, creases, self._sharp):
-            return 0.0
-        return self.adaptivity
+        return self.adaptivity if self._is_designed(creases) else 0.0
+
+    def sharp(self, creases: Ints) -> Floats:
+        """Ends of all edges that quads should have edges along, of a part with these creases.
+
+        Those that were given, or all sharp ones; none unless the part was designed with creases.
+        (c, 2, 3).
+        """
+        if not self._is_designed(creases):
+            return np.zeros((0, 2, 3))
+        edges = creases if self.creases is not None else self.mesh.edges[self._sharp]
+        return np.asarray(self.mesh.vertices[edges])
+
+    def _is_designed(self, creases: Ints) -> bool:
+        given = self.creases is not None
+        return len(creases) > 0 and (given or are_mostly_creases(self.mesh, creases, self._sharp))
 
     @cached_property
     def _sharp(self) -> Ints:
@@ -216,7 +231,7 @@ def remesh_component(wish: Component, with_uv: bool, tell: Progress) -> Part:
 
     def good_enough(mapped: _Mapped) -> bool:
         """Polish an attempt; whether it is to be the last."""
-        quads, wrong = _polished(mapped, surface, watch, tell)
+        quads, wrong = _polished(mapped, surface, wish.sharp(mapped.creases), watch, tell)
         done.append((wrong, mapped, quads))
         if wrong > 0:
             reasons.append(f"{wrong} quads stay folded")
@@ -311,11 +326,11 @@ def _by_map(
         vertices = embed_layout(layout, aligned, seamless)
     quads = QuadMesh(vertices, layout.quads)
     _require_topology(quads, wish.mesh)
-    return _Mapped(quads, aligned, seamless, tracing, layout, attempt.name)
+    return _Mapped(quads, aligned, seamless, tracing, layout, attempt.name, creases)
 
 
 def _polished(
-    mapped: _Mapped, surface: ClosestPoints, watch: Watch, tell: Progress
+    mapped: _Mapped, surface: ClosestPoints, sharp: Floats, watch: Watch, tell: Progress
 ) -> tuple[QuadMesh, int]:
     """The quads with their vertices moved to even shapes, on the surface but at the last folds.
 
@@ -333,7 +348,11 @@ def _polished(
 
         moved = polished_onto_limbs(Covering(quads, surface), fixed, polish)
     with watch("unfold"):
-        moved, wrong = lifted(moved, quads.quads, surface, fixed | (curves.curve >= 0))
+        bound = fixed | (curves.curve >= 0)
+        moved, wrong = lifted(moved, quads.quads, surface, bound)
+    with watch("creases"):
+        moved = attach_to_creases(moved, quads.quads, surface, fixed, curves, sharp)
+        moved = straddled(moved, quads.quads, curves)
     return QuadMesh(moved, quads.quads), int(wrong.sum())
 
 

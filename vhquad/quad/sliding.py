@@ -25,6 +25,7 @@ from vhquad.quad.distortion import (
 __all__ = [
     "GUIDANCE",
     "Problem",
+    "Pulls",
     "State",
     "cost",
     "folded_quads",
@@ -47,6 +48,26 @@ ALIKE, NEARLY = 0.3, 0.7  # least cosine of a quad's normal with the surface's, 
 
 
 @dataclass(frozen=True, eq=False)
+class Pulls:
+    """Points that pull at edges: weight / 2 times the squared distance of each from a place."""
+
+    edges: Ints  # (p, 2) ends of the edge that each point pulls at
+    share: Floats  # (p,) where on it, from 0 to 1
+    points: Floats  # (p, 3)
+    weight: float
+
+    def cost(self, x: Floats) -> tuple[float, Floats]:
+        """Energy of vertices at x, and its gradient; (n, 3)."""
+        ends = np.stack([1.0 - self.share, self.share], axis=1)
+        off = (ends[..., None] * x[self.edges]).sum(axis=1) - self.points
+        index = self.edges.reshape(-1)
+        pull = (ends[..., None] * off[:, None]).reshape(-1, 3)
+        total = [np.bincount(index, column, len(x)) for column in pull.T]
+        gradient = np.asarray(self.weight * np.stack(total, axis=1), dtype=np.float64)
+        return 0.5 * self.weight * float((off**2).sum()), gradient
+
+
+@dataclass(frozen=True, eq=False)
 class Problem:
     """What stays the same while vertices move."""
 
@@ -60,6 +81,7 @@ class Problem:
     trust: Floats  # (n,) weight of a vertex's surface normal in its quads' reference normals
     along: Floats  # (k, 3) unit direction for edges 0 and 2 of each quad; 0 for any
     aspect: Floats  # (k,) wanted length of edges 0 and 2 over that of edges 1 and 3
+    pulls: Pulls | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,14 +223,22 @@ def cost(
     with_gradient: bool = True,
     sides: Sides | None = None,
 ) -> Distortion:
-    """Distortion of the quads about some normals, and what their edges run off the field."""
+    """Distortion of the quads about some normals, what their edges run off the field, and pulls."""
     quads, size, aspect = problem.quads, problem.size, problem.aspect
     sides = sides or sides_of(x, quads)
     out = distortion(x, quads, normals, size, epsilon, SIZE_WEIGHT, with_gradient, aspect, sides)
-    if across is None:
-        return out
-    off, pull = misalignment(x, quads, across, size, with_gradient, aspect, sides)
-    return replace(out, energy=out.energy + GUIDANCE * off, gradient=out.gradient + GUIDANCE * pull)
+    if across is not None:
+        off, pull = misalignment(x, quads, across, size, with_gradient, aspect, sides)
+        out = _more(out, GUIDANCE * off, GUIDANCE * pull)
+    if problem.pulls is not None:
+        out = _more(out, *problem.pulls.cost(x))
+    return out
+
+
+def _more(to: Distortion, energy: float, gradient: Floats) -> Distortion:
+    """An energy with another added, and the gradients where they are wanted."""
+    total = to.gradient + gradient if len(to.gradient) else to.gradient
+    return replace(to, energy=to.energy + energy, gradient=total)
 
 
 def reference_normals(problem: Problem, normals: Floats) -> Floats:
