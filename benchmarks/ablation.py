@@ -117,7 +117,8 @@ def measure(
     if kept.exists():
         direction, magnitude = json.loads(kept.read_text())
         return direction, magnitude
-    chosen = {"steps": steps, "seed": seed, "validate_every": steps, **variant.training}
+    chosen = {"steps": steps, "seed": seed, "validate_every": steps, "weigh": "area"}
+    chosen |= variant.training
     settings = TrainSettings(**chosen)
     resume = (run / "checkpoint.safetensors").exists()
     train(dataset.folder, run, settings, replace(BASE, **variant.model), resume=resume)

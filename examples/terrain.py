@@ -224,7 +224,7 @@ def main() -> None:
                 print(f"step {record.step}: loss {record.direction:.3f}")
 
         began = time.process_time()
-        settings = TrainSettings(steps=options.steps, rate=2e-3)
+        settings = TrainSettings(steps=options.steps, rate=2e-3, weigh="area")
         result = train(folder, run, settings, MODEL, on_record=watch, device="cpu")
         print(f"trained in {time.process_time() - began:.0f} CPU s")
         network = load_model(result.model).network

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from safetensors import safe_open
+from safetensors.torch import save_file
 
 from tests.learn_data import MODEL, SETTINGS, write_shapes
 from vhquad.errors import ConfigError, DatasetError, ModelError
@@ -164,9 +167,33 @@ def test_refusals(dataset: Dataset, tmp_path: Path) -> None:
     empty = preprocess(tmp_path / "in", tmp_path / "empty", SETTINGS, 1)
     with pytest.raises(DatasetError, match="training split"):
         train(empty.folder, tmp_path / "e", SHORT, MODEL)
-    for wrong in ({"steps": 0}, {"rate": 0.0}, {"ema": 1.0}, {"precision": "half"}):
+    for wrong in (
+        {"steps": 0},
+        {"rate": 0.0},
+        {"ema": 1.0},
+        {"precision": "half"},
+        {"weigh": "no"},
+    ):
         with pytest.raises(ConfigError):
             TrainSettings(**wrong)  # type: ignore[arg-type]
+
+
+def test_vertices_count_by_edges_or_by_area(dataset: Dataset, tmp_path: Path) -> None:
+    """9. Another loss from the first step on; a run of before there was a choice goes by area."""
+    short = replace(SHORT, steps=6, validate_every=6)
+    for weigh in ("edges", "area"):
+        train(dataset.folder, tmp_path / weigh, replace(short, weigh=weigh), MODEL)
+    edges, area = (_losses(tmp_path / name / "losses.csv") for name in ("edges", "area"))
+    assert edges[1][2] != area[1][2]
+    old = tmp_path / "old"
+    train(dataset.folder, old, replace(short, weigh="area"), MODEL, stop_after=3)
+    with safe_open(old / "checkpoint.safetensors", framework="pt") as file:
+        about = json.loads(file.metadata()["run"])
+        tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+    del about["training"]["weigh"]
+    save_file(tensors, old / "checkpoint.safetensors", metadata={"run": json.dumps(about)})
+    train(dataset.folder, old, resume=True)
+    assert _losses(old / "losses.csv") == area
 
 
 def test_schedule() -> None:

@@ -48,6 +48,21 @@ def test_random_fields_score_one(rng: np.random.Generator) -> None:
     assert abs(float(loss.direction) - 1.0) < 0.02
 
 
+def test_by_edges_weighs_by_area_over_size() -> None:
+    """5. Areas 2, 3, 5 and 4 with sizes 1, 0.5, unknown and 2: edges 2, 6 and 2, 10 over 9 a unit
+    of area for the unknown; the losses are the means by these."""
+    z = stack(np.ones(4, dtype=complex), torch.float64)
+    truth = FieldTruth(z, _tensor([1.0, 0.5, 0.0, 2.0]), _tensor([2.0, 3.0, 5.0, 4.0]))
+    by_edges = truth.by_edges()
+    torch.testing.assert_close(by_edges.weight, _tensor([2.0, 6.0, 50.0 / 9.0, 2.0]))
+    assert by_edges.z is truth.z
+    assert by_edges.size is truth.size
+    off = stack(np.array([1.0, -1.0, 1.0, 1.0], dtype=complex), torch.float64)
+    loss = field_loss(FieldOutput(off, _tensor([1.0, 1.0, 1.0, 2.0])), by_edges)
+    assert abs(float(loss.direction) - 2.0 * 6.0 / (10.0 + 50.0 / 9.0)) < 1e-9
+    assert abs(float(loss.magnitude) - 6.0 / 10.0) < 1e-9
+
+
 def test_a_zero_answer_has_a_finite_gradient() -> None:
     """4. z = 0 has no direction: loss 1, gradient finite."""
     z = torch.zeros(2, 3, dtype=torch.float64, requires_grad=True)

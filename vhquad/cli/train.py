@@ -73,8 +73,8 @@ def train(
         str | None,
         typer.Option(
             "--preset",
-            help="Sizes of the network: starter, or paper (three times the work a step).  "
-            "[default: starter]",
+            help="Sizes of the network: starter, or paper (three times the work a step, and its "
+            "loss by area).  [default: starter]",
             show_default=False,
         ),
     ] = None,
@@ -138,6 +138,7 @@ def train(
         from vhquad.learn.train import train as run_training
         from vhquad.nn.settings import preset as model_preset
 
+        weigh = "area" if preset == "paper" else None
         given = {"rate": rate, "precision": precision, "seed": seed, "steps": steps}
         if resume:
             _refuse({**given, "epochs": epochs, "blocks": blocks})
@@ -149,7 +150,7 @@ def train(
         ]
         if epochs is not None:
             given["steps"] = _steps_of(epochs, ready)
-        chosen = {name: value for name, value in given.items() if value is not None}
+        chosen = {name: v for name, v in {**given, "weigh": weigh}.items() if v is not None}
         settings = None if resume else TrainSettings.from_dict(chosen)
         model = None if preset is None else model_preset(preset)
         try:

@@ -119,7 +119,8 @@ def load_run(folder: Path, settings: TrainSettings | None = None) -> RunState:
         raise ModelError(f"{path} is not a run of this version of vhquad; train anew")
     try:
         model = ModelSettings.from_dict(about["model"])
-        own = TrainSettings.from_dict(about["training"])
+        given = {"weigh": "area", **about["training"]}  # all that earlier versions had
+        own = TrainSettings.from_dict(given)
         state = RunState.new(VectorHeatNet(model), own if settings is None else settings)
         state.step = int(about["step"])
         for prefix, network in (("network", state.network), ("averaged", state.averaged)):

@@ -15,6 +15,7 @@ import numpy as np
 from vhquad.errors import ConfigError
 
 Precision = Literal["float32", "bfloat16"]
+Weighting = Literal["edges", "area"]
 
 __all__ = ["TrainSettings", "learning_rate", "mirrored", "sample_of_step"]
 
@@ -42,6 +43,9 @@ class TrainSettings:
     precision : "float32" or "bfloat16"
         Of the matrix products while training. bfloat16 takes 0.4 of the time on processors that
         have it (AVX-512 BF16, AMX, GPUs of 2020 on), more on others. Validation is in float32.
+    weigh : "edges" or "area"
+        What a vertex counts by: the length of the artist's edges around it, or its area, as in the
+        paper and in validation.
     seed : int
     validate_every, save_every : int
         Steps between validations and between checkpoints.
@@ -55,6 +59,7 @@ class TrainSettings:
     ema: float = 0.998
     mirror: bool = True
     precision: Precision = "float32"
+    weigh: Weighting = "edges"
     seed: int = 0
     validate_every: int = 1000
     save_every: int = 250
@@ -67,6 +72,8 @@ class TrainSettings:
             raise ConfigError("--rate and --clip must be positive, --weight-decay not negative")
         if self.precision not in get_args(Precision):
             raise ConfigError(f"--precision must be float32 or bfloat16, not {self.precision!r}")
+        if self.weigh not in get_args(Weighting):
+            raise ConfigError(f"weigh must be edges or area, not {self.weigh!r}")
         if not (0.0 <= self.warmup < 1.0 and 0.0 <= self.ema < 1.0):
             raise ConfigError("--warmup and --ema must lie in [0, 1)")
 

@@ -223,7 +223,8 @@ def _step(state: RunState, items: list[Item], device: torch.device) -> Record:
                 output = state.network(mesh.low_precision())
         else:
             output = state.network(mesh)
-    loss = field_loss(output.float(), sample.truth)
+    truth = sample.truth.by_edges() if settings.weigh == "edges" else sample.truth
+    loss = field_loss(output.float(), truth)
     state.optimizer.zero_grad(set_to_none=True)
     loss.total.backward()
     norm = torch.nn.utils.clip_grad_norm_(state.network.parameters(), settings.clip)
