@@ -17,6 +17,7 @@ from vhquad.mesh.quality import scaled_jacobians
 from vhquad.mesh.triangle import TriMesh
 from vhquad.quad.attach import attach_to_creases
 from vhquad.quad.curves import CurveConstraints
+from vhquad.quad.sliding import Pulls
 
 Floats = NDArray[np.float64]
 NONE = CurveConstraints.none(13 * 17)
@@ -49,6 +50,18 @@ def test_an_edge_chain_moves_onto_a_line_beside_it() -> None:
     assert off(mesh, moved, line).mean() < 0.03
     assert np.array_equal(moved[border], mesh.vertices[border])
     assert scaled_jacobians(QuadMesh(moved, mesh.quads)).min() > 0.5
+
+
+def test_the_gradient_of_pulls_is_that_of_their_energy(rng: np.random.Generator) -> None:
+    x = rng.standard_normal((7, 3))
+    edges = np.array([[0, 1], [1, 2], [0, 1], [5, 3]])
+    pulls = Pulls(edges, rng.random(4), rng.standard_normal((4, 3)), 2.5)
+    gradient = pulls.cost(x)[1]
+    for i, axis in np.ndindex(7, 3):
+        step = np.zeros((7, 3))
+        step[i, axis] = 1e-6
+        slope = (pulls.cost(x + step)[0] - pulls.cost(x - step)[0]) / 2e-6
+        assert gradient[i, axis] == pytest.approx(slope, abs=1e-7)
 
 
 def test_quads_far_away_stay() -> None:

@@ -1,8 +1,9 @@
 """Vertices of curved creases moved a little off them, so that the edges between straddle these.
 
-An edge with both ends on a curve lies on one side of it. With its ends a third of its sag off on
-the other side it is nearest to the curve on the whole: that is what the L2 projection of the curve
-onto continuous, piecewise linear functions of its arc length makes. Borders stay exact.
+An edge with both ends on a curve lies on one side of it. With its ends two thirds of its sag off on
+the other side, and its middle a third, it is nearest to the curve on the whole: that is what the L2
+projection of the curve onto continuous, piecewise linear functions of its arc length makes. Borders
+stay exact.
 """
 
 from __future__ import annotations
