@@ -31,7 +31,12 @@ def test_rows(dataset: Dataset) -> None:
     """1. A row a method and group; on a torus the principal directions are the truth."""
     found = evaluate(Model(VectorHeatNet(MODEL)), dataset.folder)
     rows = {row.method: row for row in found.rows if row.group == "whole"}
-    assert set(rows) == {"model", "model + curvature", "curvature", "principal", "random"}
+    assert set(rows) == {
+        *("model", "model + curvature", "curvature", "principal", "random"),
+        *("model + curvature, polished", "curvature, polished", "ground truth, polished"),
+    }
+    assert rows["ground truth, polished"].direction < 0.01
+    assert rows["curvature, polished"].direction < 0.05
     assert rows["model + curvature"].direction < 0.1  # random weights earn no confidence
     assert rows["random"].direction == pytest.approx(1.0, abs=0.15)
     assert rows["random"].mean_angle == pytest.approx(22.5, abs=2.0)

@@ -10,7 +10,8 @@ from tests.meshes import icosphere, torus
 from vhquad.field.cross import CrossField
 from vhquad.field.smooth import smoothest
 from vhquad.field.transport import to_vertices
-from vhquad.learn.singularities import SingularPoints, after_align, artists, singularity_row
+from vhquad.learn.polished import polished
+from vhquad.learn.singularities import SingularPoints, artists, singular_points, singularity_row
 
 BALL = icosphere(4)
 SIZE = np.full(BALL.n_vertices, 0.15)
@@ -28,7 +29,9 @@ def test_a_ball_has_eight() -> None:
     wanted = artists(BALL, field)
     assert wanted.quarters.tolist() == [1] * 8
     assert wanted.edge_length == np.float64(0.15)
-    found = after_align(BALL, field, wanted.edge_length)
+    aligned = polished(BALL, field, wanted.edge_length)
+    assert aligned is not None
+    found = singular_points(aligned)
     row = singularity_row("m", "all", [(found, wanted)])
     assert (row.meshes, row.count, row.artists, row.matched) == (1, 8, 8, 8)
 

@@ -1,7 +1,8 @@
 """Measure a model on a dataset's split, with baselines beside it.
 
 "model" is the network alone, "model + curvature" what ``vhquad predict`` answers; "curvature" is
-``--method curvature``. What the figures mean: :mod:`vhquad.learn.scores` and
+``--method curvature``; "polished" are these and the ground truth as a remesh smooths them. What the
+figures mean: :mod:`vhquad.learn.scores`, :mod:`vhquad.learn.polished` and
 :mod:`vhquad.learn.singularities`.
 """
 
@@ -23,6 +24,7 @@ from vhquad.learn.confidence import confidence
 from vhquad.learn.dataset import Dataset, SampleEntry, Split, open_dataset
 from vhquad.learn.device import choose_device
 from vhquad.learn.maps import draw_error_map
+from vhquad.learn.polished import compare_polished, polished
 from vhquad.learn.predict import predict_input
 from vhquad.learn.scores import (
     CalibrationBin,
@@ -36,8 +38,8 @@ from vhquad.learn.singularities import (
     ArtistsPoints,
     SingularityRow,
     SingularPoints,
-    after_align,
     artists,
+    singular_points,
     singularity_row,
 )
 from vhquad.learn.train import check_fit
@@ -51,6 +53,7 @@ __all__ = ["ALL", "ANSWER", "Evaluation", "SampleScore", "evaluate"]
 SPLITS: tuple[Split, ...] = ("train", "val", "test")
 MODEL, ANSWER, CURVATURE = "model", "model + curvature", "curvature"
 ARTIST = "ground truth"
+POLISHED = "{}, polished"
 ALL = "all"
 
 
@@ -202,12 +205,19 @@ def _measure(
     trust = fields[MODEL].confidence
     assert trust is not None
     wanted = artists(mesh, truth)
-    aligned = {ARTIST: truth, ANSWER: fields[ANSWER], CURVATURE: fields[CURVATURE]}
+    errors = {method: compare(field, truth, mass) for method, field in fields.items()}
+    singular: dict[str, SingularPoints | None] = {}
+    remeshed = {ANSWER: fields[ANSWER], CURVATURE: fields[CURVATURE], ARTIST: truth}
+    for method, given in remeshed.items():
+        aligned = polished(mesh, given, wanted.edge_length)
+        singular[method] = None if aligned is None else singular_points(aligned)
+        if aligned is not None:
+            errors[POLISHED.format(method)] = compare_polished(aligned, mesh, truth)
     return _Measured(
         entry=entry,
-        errors={method: compare(field, truth, mass) for method, field in fields.items()},
+        errors=errors,
         confidence=trust,
-        singular={m: after_align(mesh, f, wanted.edge_length) for m, f in aligned.items()},
+        singular=singular,
         artists=wanted,
     )
 
@@ -219,8 +229,9 @@ def _summary(split: str, found: list[_Measured]) -> Evaluation:
         groups |= {v: [m for m in found if m.entry.variant == v] for v in variants}
     rows, singularities = [], []
     for group, members in groups.items():
-        for method in found[0].errors:
-            rows.append(evaluation_row(method, group, [m.errors[method] for m in members]))
+        for method in dict.fromkeys(name for m in members for name in m.errors):
+            errors = [m.errors[method] for m in members if method in m.errors]
+            rows.append(evaluation_row(method, group, errors))
         for method in found[0].singular:
             pairs = [(m.singular[method], m.artists) for m in members]
             singularities.append(singularity_row(method, group, pairs))

@@ -9,19 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from vhquad.errors import FieldError
-from vhquad.field.align import AlignSettings, align_field
+from vhquad.field.align import AlignedField
 from vhquad.field.cross import CrossField
 from vhquad.field.singular import find_singularities
-from vhquad.field.transport import to_faces
 from vhquad.mesh.triangle import TriMesh
 
 __all__ = [
     "ArtistsPoints",
     "SingularPoints",
     "SingularityRow",
-    "after_align",
     "artists",
+    "singular_points",
     "singularity_row",
 ]
 
@@ -106,30 +104,8 @@ def artists(mesh: TriMesh, truth: CrossField) -> ArtistsPoints:
     return ArtistsPoints(mesh.vertices[vertex], found.quarters[kept], size[vertex], length)
 
 
-def after_align(mesh: TriMesh, field: CrossField, edge_length: float) -> SingularPoints | None:
-    """Singularities that are left of a field when a remesh has smoothed and aligned it.
-
-    As in :mod:`vhquad.quad.pipeline`, without creases, which would take up some of them.
-
-    Parameters
-    ----------
-    mesh : TriMesh
-    field : CrossField
-        On vertices or faces.
-    edge_length : float
-        Of the quads to come.
-
-    Returns
-    -------
-    SingularPoints or None
-        None if the mesh is too coarse for any legal field.
-    """
-    try:
-        aligned = align_field(
-            mesh, to_faces(mesh, field), settings=AlignSettings(edge_length=edge_length)
-        )
-    except FieldError:
-        return None
+def singular_points(aligned: AlignedField) -> SingularPoints:
+    """The interior singularities of a polished field."""
     singular = (aligned.sector_quads != 4) & ~aligned.sector_is_feature
     vertex = aligned.sector_vertex[singular]
     return SingularPoints(aligned.mesh.vertices[vertex], 4 - aligned.sector_quads[singular])
