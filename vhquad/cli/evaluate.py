@@ -79,10 +79,10 @@ def evaluate(
 
     Prints the losses, angles and sizes of the network alone (`model`), of what `vhquad predict`
     makes of it (`model + curvature`), and of fields that need no learning: the one of `--method
-    curvature`, the principal directions of curvature, and random ones; `polished` as a remesh
-    smooths them. Then how many singularities a remesh would find, against the artist's; and whether
-    the model is right where it says that it is sure. A random field has a direction loss of 1 and
-    is 22.5 degrees off; 0 is perfect.
+    curvature`, the principal directions of curvature, and random ones. Then the directions once
+    more as a remesh smooths the fields; how many singularities a remesh would find, against the
+    artist's; and whether the model is right where it says that it is sure. A random field has a
+    direction loss of 1 and is 22.5 degrees off; 0 is perfect.
     """
     if split not in SPLITS:
         raise ConfigError(f"--split takes {', '.join(SPLITS[:-1])} or {SPLITS[-1]}, not {split!r}")

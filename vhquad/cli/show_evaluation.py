@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ from vhquad.jsonable import plain, write_json
 
 if TYPE_CHECKING:
     from vhquad.learn.evaluate import Evaluation
+    from vhquad.learn.scores import EvaluationRow
 
 __all__ = ["publish_evaluation"]
 
@@ -33,15 +35,21 @@ def publish_evaluation(
     if shell.quiet:
         return
     console = Console(markup=False, highlight=False)
-    for table in (_losses(found), _sizes(found), _singularities(found), _calibration(found)):
+    for table in (
+        _losses(found.rows, f"directions, {_samples(len(found.samples))}"),
+        _losses(found.polished, "directions, as a remesh smooths the field"),
+        _sizes(found),
+        _singularities(found),
+        _calibration(found),
+    ):
         console.print(table)
 
 
-def _losses(found: Evaluation) -> Table:
-    names = ("loss", "±", "mean angle", "median", "95 % below", "over 15°")
-    table = _table(f"directions, {_samples(len(found.samples))}", "", *names)
+def _losses(rows: Sequence[EvaluationRow], title: str) -> Table:
+    names = ("loss", "±", "mean", "median", "95 %", "over 15°")
+    table = _table(title, "", *names)
     group = None
-    for row in found.rows:
+    for row in rows:
         group = _section(table, group, row.group, row.meshes)
         table.add_row(
             row.method,
@@ -100,9 +108,9 @@ def _calibration(found: Evaluation) -> Table:
 
 def _table(title: str, first: str, *columns: str) -> Table:
     table = Table(box=box.SIMPLE, title=title, title_justify="left", pad_edge=False)
-    table.add_column(first, no_wrap=True)
+    table.add_column(first, overflow="fold")  # where there is no room; figures have theirs
     for name in columns:
-        table.add_column(name, justify="right")
+        table.add_column(name, justify="right", no_wrap=True)
     return table
 
 

@@ -1,8 +1,8 @@
 """Measure a model on a dataset's split, with baselines beside it.
 
 "model" is the network alone, "model + curvature" what ``vhquad predict`` answers; "curvature" is
-``--method curvature``; "polished" are these and the ground truth as a remesh smooths them. What the
-figures mean: :mod:`vhquad.learn.scores`, :mod:`vhquad.learn.polished` and
+``--method curvature``. These two and the ground truth are measured as a remesh smooths them, too.
+What the figures mean: :mod:`vhquad.learn.scores`, :mod:`vhquad.learn.polished` and
 :mod:`vhquad.learn.singularities`.
 """
 
@@ -53,13 +53,15 @@ __all__ = ["ALL", "ANSWER", "Evaluation", "SampleScore", "evaluate"]
 SPLITS: tuple[Split, ...] = ("train", "val", "test")
 MODEL, ANSWER, CURVATURE = "model", "model + curvature", "curvature"
 ARTIST = "ground truth"
-POLISHED = "{}, polished"
 ALL = "all"
 
 
 @dataclass(frozen=True)
 class SampleScore:
-    """Losses on one sample, by method; magnitudes of those that have sizes."""
+    """Losses on one sample, by method; magnitudes of those that have sizes.
+
+    ``polished`` are direction losses after the smoothing that a remesh applies.
+    """
 
     name: str
     shape: str
@@ -68,6 +70,7 @@ class SampleScore:
     vertices: int
     direction: dict[str, float]
     magnitude: dict[str, float]
+    polished: dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -80,9 +83,11 @@ class Evaluation:
     rows : tuple of EvaluationRow
         A row for each method and group: all samples together, then each variant ("whole",
         "cropped" ...) if there are several.
-    singularities : tuple of SingularityRow
+    polished : tuple of EvaluationRow
         Likewise, after the smoothing that a remesh applies; "ground truth" is what that leaves of
         the artist's field itself.
+    singularities : tuple of SingularityRow
+        Likewise, after that smoothing.
     calibration : tuple of CalibrationBin
         Direction losses by stated confidence.
     samples : tuple of SampleScore
@@ -92,6 +97,7 @@ class Evaluation:
 
     split: str
     rows: tuple[EvaluationRow, ...]
+    polished: tuple[EvaluationRow, ...]
     singularities: tuple[SingularityRow, ...]
     calibration: tuple[CalibrationBin, ...]
     samples: tuple[SampleScore, ...]
@@ -106,6 +112,7 @@ class Evaluation:
 class _Measured:
     entry: SampleEntry
     errors: dict[str, FieldErrors]
+    polished: dict[str, FieldErrors]
     confidence: NDArray[np.float64]
     singular: dict[str, SingularPoints | None]
     artists: ArtistsPoints
@@ -205,17 +212,18 @@ def _measure(
     trust = fields[MODEL].confidence
     assert trust is not None
     wanted = artists(mesh, truth)
-    errors = {method: compare(field, truth, mass) for method, field in fields.items()}
+    after: dict[str, FieldErrors] = {}
     singular: dict[str, SingularPoints | None] = {}
     remeshed = {ANSWER: fields[ANSWER], CURVATURE: fields[CURVATURE], ARTIST: truth}
     for method, given in remeshed.items():
         aligned = polished(mesh, given, wanted.edge_length)
         singular[method] = None if aligned is None else singular_points(aligned)
         if aligned is not None:
-            errors[POLISHED.format(method)] = compare_polished(aligned, mesh, truth)
+            after[method] = compare_polished(aligned, mesh, truth)
     return _Measured(
         entry=entry,
-        errors=errors,
+        errors={method: compare(field, truth, mass) for method, field in fields.items()},
+        polished=after,
         confidence=trust,
         singular=singular,
         artists=wanted,
@@ -227,12 +235,14 @@ def _summary(split: str, found: list[_Measured]) -> Evaluation:
     groups = {ALL: found}
     if len(variants) > 1:
         groups |= {v: [m for m in found if m.entry.variant == v] for v in variants}
-    rows, singularities = [], []
+    rows, polished_rows, singularities = [], [], []
     for group, members in groups.items():
-        for method in dict.fromkeys(name for m in members for name in m.errors):
-            errors = [m.errors[method] for m in members if method in m.errors]
-            rows.append(evaluation_row(method, group, errors))
+        for method in found[0].errors:
+            rows.append(evaluation_row(method, group, [m.errors[method] for m in members]))
         for method in found[0].singular:
+            after = [m.polished[method] for m in members if method in m.polished]
+            if after:
+                polished_rows.append(evaluation_row(method, group, after))
             pairs = [(m.singular[method], m.artists) for m in members]
             singularities.append(singularity_row(method, group, pairs))
     binned = calibration(
@@ -240,7 +250,9 @@ def _summary(split: str, found: list[_Measured]) -> Evaluation:
         {name: [m.errors[name] for m in found] for name in (MODEL, CURVATURE, ANSWER)},
     )
     samples = tuple(_score(measured) for measured in found)
-    return Evaluation(split, tuple(rows), tuple(singularities), binned, samples)
+    return Evaluation(
+        split, tuple(rows), tuple(polished_rows), tuple(singularities), binned, samples
+    )
 
 
 def _score(measured: _Measured) -> SampleScore:
@@ -254,4 +266,5 @@ def _score(measured: _Measured) -> SampleScore:
         vertices=entry.vertices,
         direction={method: row.direction for method, row in rows.items()},
         magnitude={m: row.magnitude for m, row in rows.items() if row.magnitude is not None},
+        polished={method: errors.direction for method, errors in measured.polished.items()},
     )
