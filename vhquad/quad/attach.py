@@ -22,6 +22,7 @@ from vhquad.mesh.vectors import unit
 from vhquad.quad.aspects import smoothed_aspects
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.descent import descend, laplacian_factor
+from vhquad.quad.lift import wrong_quads
 from vhquad.quad.sliding import Problem, Pulls, make_problem, measure, place
 from vhquad.quad.smooth import smoothed_sizes
 
@@ -83,7 +84,8 @@ def attach_to_creases(
     Returns
     -------
     (n, 3) float64
-        Positions; no quad is folded, or poorer than `POOR`, that was not before.
+        Positions; no quad is folded, turned against the surface, or poorer than `POOR`, that was
+        not before.
     """
     if len(creases) == 0:
         return vertices
@@ -146,6 +148,7 @@ def _pulled(problem: Problem, x: Floats, edges: Ints, points: _Points, length: f
     everywhere = np.ones(len(x), dtype=bool)
     given = place(replace(problem, fixed=everywhere), x, None)
     least = np.minimum(_jacobians(x, problem.quads), POOR)
+    wrong = wrong_quads(x, problem.quads, problem.surface)
     still = problem.fixed
     for _ in range(TRIES):
         free = edges[~still[edges].all(axis=1)]
@@ -163,6 +166,7 @@ def _pulled(problem: Problem, x: Floats, edges: Ints, points: _Points, length: f
             state = descend(pulling, measure(pulling, *same), factor, ITERATIONS)
         worse = _jacobians(state.vertices, problem.quads) < least
         worse |= state.folded & ~given.folded
+        worse |= wrong_quads(state.vertices, problem.quads, problem.surface) & ~wrong
         if not worse.any():
             return state.vertices
         still = still.copy()
