@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from tests.map_stages import noisy
-from tests.meshes import grid, icosphere, merge, moved, tetrahedron
+from tests.meshes import cube, grid, icosphere, merge, moved, tetrahedron
 from tests.remesh_checks import check_valid, run
 from vhquad.errors import ParametrizationError
-from vhquad.field.align import align_field
+from vhquad.field.align import AlignedField, align_field
 from vhquad.field.cross import CrossField
 from vhquad.mesh.triangle import TriMesh
 from vhquad.quad import component, continuous
 from vhquad.quad.component import MAP, PAIRED
 from vhquad.quad.quantize import Quantisation, quantise
+from vhquad.quad.seamless_map import SeamlessMap
 from vhquad.quad.tmesh import TMesh
 
 
@@ -34,6 +36,35 @@ def test_a_field_without_a_map_falls_back(monkeypatch: pytest.MonkeyPatch) -> No
         assert part.method == "paired triangles"
         assert "3 triangles of the map stay folded after 9 solves" in part.reason
     assert any("paired triangles" in line for line in result.report.shortfalls())
+
+
+def test_creases_beside_folds_go_before_all_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A map folded in the middle of one edge of a cube as long as that is a crease."""
+    solve = continuous.solve_seamless_map
+    creases: list[int] = []
+
+    def folded(aligned: AlignedField, **given: Any) -> SeamlessMap:
+        made, mesh = solve(aligned, **given), aligned.mesh
+        creases.append(int(aligned.feature.sum()) // 2)
+        middle = 0.5 * (mesh.vertices[mesh.tail] + mesh.vertices[mesh.head])
+        on_edge = (middle[:, 0] > 0.49) & (middle[:, 1] > 0.49) & (np.abs(middle[:, 2]) < 0.15)
+        if not (on_edge & aligned.feature).any():
+            return made
+        uv = made.uv.copy()
+        bad = np.unique(np.flatnonzero(on_edge) // 3)
+        uv[bad] = uv[bad][:, ::-1]
+        return replace(made, uv=uv, flips=len(bad))
+
+    monkeypatch.setattr(continuous, "solve_seamless_map", folded)
+    mesh = cube(6)
+    result = run(mesh, 600)
+    part = result.report.components[0]
+    assert part.method == f"{MAP}, some creases"
+    assert "triangles of the map stay folded" in part.reason
+    assert result.report.quality.folded_quads == 0
+    assert creases[0] == 12 * 6
+    assert 11 * 6 <= creases[-1] < 12 * 6
+    assert any("some creases" in line for line in result.report.shortfalls())
 
 
 @pytest.mark.parametrize(

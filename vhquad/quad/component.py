@@ -7,17 +7,19 @@ rectangles (:mod:`vhquad.quad.tmesh`), quantised (:mod:`vhquad.quad.quantize`), 
 folds (:mod:`vhquad.quad.lift`). At last edges come as near to creases as they can: to those that
 the layout left out (:mod:`vhquad.quad.attach`) and to those it follows
 (:mod:`vhquad.quad.straddle`). Where no valid map is found the field is smoothed further, then
-creases are given up, and at last triangles paired (:mod:`vhquad.quad.fallback`).
+creases are given up, those beside folds first, and at last triangles paired
+(:mod:`vhquad.quad.fallback`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from vhquad.errors import FieldError, ParametrizationError
 from vhquad.field.align import AlignedField, AlignReport
@@ -42,7 +44,7 @@ from vhquad.quad.limbs import Covering, polished_onto_limbs
 from vhquad.quad.motorcycle import Tracing, trace
 from vhquad.quad.parts import Part, UvMap
 from vhquad.quad.quantize import quantise
-from vhquad.quad.seamless_map import SIZE_WEIGHT, SeamlessMap
+from vhquad.quad.seamless_map import SIZE_WEIGHT, SeamlessMap, twice_area
 from vhquad.quad.smooth import smooth_quads
 from vhquad.quad.straddle import straddled
 from vhquad.quad.tips import put_on_tips
@@ -58,6 +60,7 @@ Floats = NDArray[np.float64]
 
 NEAR_COUNT = 1.10  # a factor from the count asked for
 MOST_POLISHED = 2  # attempts, while quads stay folded
+_BESIDE = 0.5  # wanted quad edges between a crease that is given up and a folded triangle
 
 Progress = Callable[[str, float], None]
 
@@ -112,6 +115,14 @@ class _Attempt:
         if angle is None:
             return np.zeros((0, 2), dtype=np.int64)
         return creases_for_quads(mesh, angle, length, self.crease_length)
+
+
+class _FoldedMap(ParametrizationError):
+    """No valid map; ``places`` are the corners of its folded triangles, (k, 3)."""
+
+    def __init__(self, message: str, places: Floats) -> None:
+        super().__init__(message)
+        self.places = places
 
 
 PAIRED = "paired triangles"
@@ -239,7 +250,7 @@ def remesh_component(wish: Component, with_uv: bool, tell: Progress) -> Part:
 
     for attempt, creases, for_quads in wish.attempts():
         try:
-            mapped = _by_map(wish, creases, attempt, for_quads, watch, tell)
+            mapped = _mapped(wish, creases, attempt, for_quads, watch, tell)
         except (ParametrizationError, FieldError) as problem:
             reasons.append(str(problem))
             continue
@@ -283,6 +294,40 @@ def remesh_component(wish: Component, with_uv: bool, tell: Progress) -> Part:
     return Part(quads, report, uv)
 
 
+def _mapped(
+    wish: Component,
+    creases: Ints,
+    attempt: _Attempt,
+    for_quads: float,
+    watch: Watch,
+    tell: Progress,
+) -> _Mapped:
+    """Quads by a map; all but at first, creases beside triangles that stay folded are given up.
+
+    Raises
+    ------
+    ParametrizationError, FieldError
+        As :func:`_by_map` does.
+    """
+    try:
+        return _by_map(wish, creases, attempt, for_quads, watch, tell)
+    except _FoldedMap as folded:
+        beside = _BESIDE * float(np.sqrt(wish.mesh.area / for_quads))
+        kept = creases[~_are_near(wish.mesh.vertices[creases], folded.places, beside)]
+        if attempt is _ATTEMPTS[0] or not 0 < len(kept) < len(creases):
+            raise
+    found = _by_map(wish, kept, attempt, for_quads, watch, tell)
+    return replace(found, method=f"{MAP}, some creases")
+
+
+def _are_near(edges: Floats, places: Floats, distance: float) -> Bools:
+    """Which edges (c, 2, 3) come as near to some of the places (k, 3); (c,)."""
+    share = np.linspace(0.0, 1.0, 9)[:, None, None]
+    points = (1.0 - share) * edges[:, 0] + share * edges[:, 1]
+    away = np.asarray(cKDTree(places).query(points)[0])
+    return np.asarray((away < distance).any(axis=0))
+
+
 def _by_map(
     wish: Component,
     creases: Ints,
@@ -313,8 +358,10 @@ def _by_map(
     continuous = wanted.solve(wish.cache, watch, tell)
     aligned, seamless = continuous.aligned, continuous.seamless
     if not seamless.is_valid:
-        raise ParametrizationError(
-            f"{seamless.flips} triangles of the map stay folded after {seamless.solves} solves"
+        folded = aligned.mesh.faces[twice_area(seamless.uv) <= 0]
+        raise _FoldedMap(
+            f"{seamless.flips} triangles of the map stay folded after {seamless.solves} solves",
+            aligned.mesh.vertices[np.unique(folded)],
         )
     tell("quantise", 0.5)
     with watch("quantise"):
