@@ -10,7 +10,8 @@ import pytest
 
 from tests.learn_data import MODEL, SETTINGS, write_shapes
 from vhquad.errors import DatasetError, ModelError
-from vhquad.learn.dataset import Dataset
+from vhquad.field.cross import CrossField
+from vhquad.learn.dataset import Dataset, SampleEntry
 from vhquad.learn.evaluate import evaluate
 from vhquad.learn.preprocess import preprocess
 from vhquad.mesh.triangle import TriMesh
@@ -63,8 +64,25 @@ def test_polished(dataset: Dataset) -> None:
     assert every["curvature"].direction == pytest.approx(np.mean(scores))
 
 
+def test_no_face_with_truth(dataset: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
+    """3. Truth at single vertices is compared there; no face has any, so no polished row."""
+    whole = Dataset.truth_field
+
+    def lone(self: Dataset, entry: SampleEntry) -> CrossField:
+        truth = whole(self, entry)
+        z = np.zeros_like(truth.z)
+        z[0] = truth.z[0]
+        return replace(truth, z=z)
+
+    monkeypatch.setattr(Dataset, "truth_field", lone)
+    found = evaluate(Model(VectorHeatNet(MODEL)), dataset.folder)
+    assert found.polished == ()
+    assert found.row("principal").meshes == 4
+    assert found.row("principal").direction < 0.1
+
+
 def test_singularities(dataset: Dataset) -> None:
-    """3. A ring has none, and neither has what curvature makes of it."""
+    """4. A ring has none, and neither has what curvature makes of it."""
     rows = evaluate(Model(VectorHeatNet(MODEL)), dataset.folder).singularities
     whole = {row.method: row for row in rows if row.group == "whole"}
     assert set(whole) == {"ground truth", "model + curvature", "curvature"}
@@ -86,7 +104,7 @@ def test_splits(dataset: Dataset) -> None:
 
 
 def test_refusals(dataset: Dataset) -> None:
-    """4. Models for other data, and those that predict no crosses."""
+    """5. Models for other data, and those that predict no crosses."""
     with pytest.raises(DatasetError, match="k = 12"):
         evaluate(Model(VectorHeatNet(replace(MODEL, k=12))), dataset.folder)
     with pytest.raises(ModelError, match="order 1"):
@@ -94,7 +112,7 @@ def test_refusals(dataset: Dataset) -> None:
 
 
 def test_maps(dataset: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """5. A picture a sample; a field that is right is dark where a wrong one is bright."""
+    """6. A picture a sample; a field that is right is dark where a wrong one is bright."""
     pv = pytest.importorskip("pyvista")
     from vhquad.learn.maps import draw_error_map
     from vhquad.learn.scores import FieldErrors

@@ -15,11 +15,12 @@ from vhquad.errors import ParametrizationError
 from vhquad.field.align import AlignedField, align_field
 from vhquad.field.cross import CrossField
 from vhquad.mesh.triangle import TriMesh
-from vhquad.quad import component, continuous
-from vhquad.quad.component import MAP, PAIRED
+from vhquad.quad import continuous, mapping
+from vhquad.quad.component import PAIRED
 from vhquad.quad.quantize import Quantisation, quantise
 from vhquad.quad.seamless_map import SeamlessMap
 from vhquad.quad.tmesh import TMesh
+from vhquad.report import MAP
 
 
 def test_a_field_without_a_map_falls_back(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -82,7 +83,7 @@ def test_a_count_that_nothing_meets_is_explained(
         made.append(found.n_quads)
         return found
 
-    monkeypatch.setattr(component, "quantise", more)
+    monkeypatch.setattr(mapping, "quantise", more)
     mesh = tetrahedron()
     result = run(mesh, 60)
     check_valid(mesh, result)
@@ -101,7 +102,7 @@ def test_a_layout_of_another_topology_is_refused(monkeypatch: pytest.MonkeyPatch
         made = quantise(tmesh, target, area)
         return replace(made, layout=replace(made.layout, quads=made.layout.quads[1:]))
 
-    monkeypatch.setattr(component, "quantise", with_a_hole)
+    monkeypatch.setattr(mapping, "quantise", with_a_hole)
     result = run(icosphere(2), 100)
     check_valid(icosphere(2), result)
     part = result.report.components[0]
@@ -122,7 +123,7 @@ def test_every_further_attempt_leaves_fewer_singularities(monkeypatch: pytest.Mo
         raise ParametrizationError("not at this density")
 
     monkeypatch.setattr(continuous, "align_field", watched)
-    monkeypatch.setattr(component, "quantise", never)
+    monkeypatch.setattr(mapping, "quantise", never)
     mesh = icosphere(3)
     result = run(mesh, 60, CrossField("faces", noisy(mesh, 1.0, np.random.default_rng(0))))
     assert result.report.components[0].method == PAIRED

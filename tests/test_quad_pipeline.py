@@ -34,8 +34,8 @@ from vhquad.field.transport import to_vertices
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.quality import scaled_jacobians
 from vhquad.mesh.triangle import TriMesh
-from vhquad.quad.component import MAP
 from vhquad.quad.pipeline import RemeshSettings, remesh_mesh
+from vhquad.report import MAP
 
 
 @pytest.mark.parametrize("case", CLOSED + OPEN, ids=str)

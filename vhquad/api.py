@@ -24,7 +24,7 @@ from vhquad.mesh.quality import check_quads
 from vhquad.mesh.repair import repair
 from vhquad.mesh.scalars import carried
 from vhquad.mesh.triangle import TriMesh
-from vhquad.quad.component import Progress
+from vhquad.quad.mapping import Progress
 from vhquad.quad.pipeline import RemeshResult, RemeshSettings
 from vhquad.quad.remeshing import remesh_predicted, remesh_with
 from vhquad.quad.sizing import SIZE_RANGE, checked_density

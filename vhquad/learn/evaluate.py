@@ -218,8 +218,9 @@ def _measure(
     for method, given in remeshed.items():
         aligned = polished(mesh, given, wanted.edge_length)
         singular[method] = None if aligned is None else singular_points(aligned)
-        if aligned is not None:
-            after[method] = compare_polished(aligned, mesh, truth)
+        errors = None if aligned is None else compare_polished(aligned, mesh, truth)
+        if errors is not None:
+            after[method] = errors
     return _Measured(
         entry=entry,
         errors={method: compare(field, truth, mass) for method, field in fields.items()},

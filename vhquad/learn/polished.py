@@ -18,7 +18,7 @@ __all__ = ["compare_polished", "polished"]
 def polished(mesh: TriMesh, field: CrossField, edge_length: float) -> AlignedField | None:
     """A field as a remesh smooths and aligns it before it makes a map.
 
-    As in :mod:`vhquad.quad.pipeline`, without creases, which would take up some of them.
+    As in :mod:`vhquad.quad.pipeline`, without creases: singularities would move onto these.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def polished(mesh: TriMesh, field: CrossField, edge_length: float) -> AlignedFie
         return None
 
 
-def compare_polished(aligned: AlignedField, mesh: TriMesh, truth: CrossField) -> FieldErrors:
+def compare_polished(aligned: AlignedField, mesh: TriMesh, truth: CrossField) -> FieldErrors | None:
     """Errors of a field that a remesh has smoothed, on its faces.
 
     Parameters
@@ -52,10 +52,10 @@ def compare_polished(aligned: AlignedField, mesh: TriMesh, truth: CrossField) ->
     truth : CrossField
         On the vertices; faces of which a corner is unknown do not count.
 
-    Raises
-    ------
-    FieldError
-        If nothing of the truth is known.
+    Returns
+    -------
+    FieldErrors or None
+        None if there is no other face.
     """
     wanted = to_faces(mesh, truth)
     coherence = np.ones(mesh.n_faces) if wanted.confidence is None else wanted.confidence
@@ -63,7 +63,7 @@ def compare_polished(aligned: AlignedField, mesh: TriMesh, truth: CrossField) ->
     of = aligned.parent_face
     weight = aligned.mesh.face_areas * (coherence * known)[of]
     if not weight.sum() > 0:
-        raise FieldError("the ground truth is empty: no face has a direction")
+        return None
     arms = to_3d(np.exp(0.25j * np.angle(wanted.z)), face_axes(mesh))
     own = to_3d(np.exp(1j * aligned.angle), face_axes(aligned.mesh))
     cosine = np.einsum("fi,fi->f", arms[of], own).clip(-1.0, 1.0)

@@ -15,7 +15,7 @@ from vhquad.mesh.intersections import self_intersections
 from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.triangle import TriMesh
 
-__all__ = ["QualityReport", "check_quads", "flipped_quads", "scaled_jacobians"]
+__all__ = ["QualityReport", "check_quads", "flipped_quads", "least_jacobians", "scaled_jacobians"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -161,6 +161,11 @@ def scaled_jacobians(mesh: QuadMesh) -> Floats:
     whole = np.linalg.norm(a, axis=2) * np.linalg.norm(b, axis=2)
     whole = whole * np.linalg.norm(normal, axis=1)[:, None]
     return np.divide(part, whole, out=np.zeros_like(part), where=whole > 0)
+
+
+def least_jacobians(vertices: Floats, quads: Ints) -> Floats:
+    """Scaled Jacobian of the worst corner of each quad; (k,)."""
+    return np.asarray(scaled_jacobians(QuadMesh(vertices, quads)).min(axis=1))
 
 
 def flipped_quads(mesh: QuadMesh, surface: ClosestPoints) -> Ints:

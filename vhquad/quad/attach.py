@@ -16,9 +16,9 @@ from scipy.spatial import cKDTree
 
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.quad import QuadMesh
-from vhquad.mesh.quality import scaled_jacobians
+from vhquad.mesh.quality import least_jacobians
 from vhquad.mesh.rings import separate_parts, within_rings
-from vhquad.mesh.vectors import unit
+from vhquad.mesh.vectors import nearest_share, unit
 from vhquad.quad.aspects import smoothed_aspects
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.descent import descend, laplacian_factor
@@ -135,7 +135,7 @@ def _attached(problem: Problem, x: Floats, edges: Ints, points: _Points, length:
     First with all vertices free; then those of poor quads stay, whose barrier holds up all others.
     """
     x = _pulled(problem, x, edges, points, length)
-    poor = _jacobians(x, problem.quads) < POOR
+    poor = least_jacobians(x, problem.quads) < POOR
     if not poor.any():
         return x
     still = problem.fixed.copy()
@@ -147,7 +147,7 @@ def _pulled(problem: Problem, x: Floats, edges: Ints, points: _Points, length: f
     """Positions after the pulls; vertices around quads that come out poor stay in the end."""
     everywhere = np.ones(len(x), dtype=bool)
     given = place(replace(problem, fixed=everywhere), x, None)
-    least = np.minimum(_jacobians(x, problem.quads), POOR)
+    least = np.minimum(least_jacobians(x, problem.quads), POOR)
     wrong = wrong_quads(x, problem.quads, problem.surface)
     still = problem.fixed
     for _ in range(TRIES):
@@ -164,7 +164,7 @@ def _pulled(problem: Problem, x: Floats, edges: Ints, points: _Points, length: f
             pulling = replace(part, pulls=pulls)
             same = (state.vertices, state.arc, state.normals, state.face)
             state = descend(pulling, measure(pulling, *same), factor, ITERATIONS)
-        worse = _jacobians(state.vertices, problem.quads) < least
+        worse = least_jacobians(state.vertices, problem.quads) < least
         worse |= state.folded & ~given.folded
         worse |= wrong_quads(state.vertices, problem.quads, problem.surface) & ~wrong
         if not worse.any():
@@ -172,11 +172,6 @@ def _pulled(problem: Problem, x: Floats, edges: Ints, points: _Points, length: f
         still = still.copy()
         still[problem.quads[within_rings(problem.quads, worse)]] = True
     return x
-
-
-def _jacobians(vertices: Floats, quads: Ints) -> Floats:
-    """Least scaled Jacobian of each quad; (k,)."""
-    return np.asarray(scaled_jacobians(QuadMesh(vertices, quads)).min(axis=1))
 
 
 def _distance_from(curves: CurveConstraints, points: Floats, step: float) -> Floats:
@@ -208,12 +203,10 @@ def _nearest(
     a, side = x[edges[:, 0]], x[edges[:, 1]] - x[edges[:, 0]]
     count = min(NEIGHBOURS, len(edges))
     near = np.asarray(cKDTree(a + 0.5 * side).query(points, k=count)[1]).reshape(-1, count)
-    squared = np.maximum((side**2).sum(axis=1), 1e-300)[near]
-    share = ((points[:, None] - a[near]) * side[near]).sum(axis=2) / squared
-    share = np.clip(share, 0.0, 1.0)
+    share = nearest_share(points[:, None], a[near], side[near])
     gap = np.linalg.norm(a[near] + share[..., None] * side[near] - points[:, None], axis=2)
     if along is not None:
-        cosine = np.abs((side[near] * along[:, None]).sum(axis=2)) / np.sqrt(squared)
+        cosine = np.abs((unit(side)[near] * along[:, None]).sum(axis=2))
         gap = np.where(cosine > ALONG, gap, np.inf)
     best = gap.argmin(axis=1)
     row = np.arange(len(points))

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vhquad.errors import MeshError
+from vhquad.mesh.vectors import nearest_share
 
 __all__ = ["CurveConstraints"]
 
@@ -118,12 +119,11 @@ class CurveConstraints:
         for c in np.unique(curve):  # curves are few
             a = self.points[self.start[c] : self.start[c + 1] - 1]
             along = self.points[self.start[c] + 1 : self.start[c + 1]] - a
-            squared = np.maximum((along**2).sum(axis=1), 1e-300)
             mine = np.flatnonzero(curve == c)
             for chunk in np.array_split(mine, 1 + len(mine) * len(a) // 2_000_000):
-                offset = points[chunk][:, None, :] - a[None]
-                t = np.clip(np.einsum("qsi,si->qs", offset, along) / squared, 0.0, 1.0)
-                gap = offset - t[..., None] * along
+                near = points[chunk][:, None, :]
+                t = nearest_share(near, a, along)
+                gap = near - a - t[..., None] * along
                 best = np.einsum("qsi,qsi->qs", gap, gap).argmin(axis=1)
                 k = self.start[c] + best
                 share = t[np.arange(len(chunk)), best]

@@ -18,7 +18,9 @@ from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.quality import check_quads
 from vhquad.mesh.triangle import TriMesh
-from vhquad.quad.component import Component, Progress, remesh_component
+from vhquad.quad.attempts import Component
+from vhquad.quad.component import remesh_component
+from vhquad.quad.mapping import Progress
 from vhquad.quad.parts import Part, UvMap, join_quads, join_uv
 from vhquad.quad.sizing import checked_density, wanted_sizes
 from vhquad.quad.symmetric import SYMMETRIES, find_plane, remesh_mirrored

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 from vhquad.field.cross import CrossField
 from vhquad.mesh.triangle import TriMesh
-from vhquad.quad.component import PAIRED, Progress
+from vhquad.quad.component import PAIRED
+from vhquad.quad.mapping import Progress
 from vhquad.quad.pipeline import RemeshResult, RemeshSettings, remesh_mesh
 from vhquad.quad.stand_in import StandIn, make_stand_in
 from vhquad.watch import Watch

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 
 from vhquad.geometry.sparse import SymmetricFactor
-from vhquad.mesh.quad import QuadMesh
-from vhquad.mesh.quality import scaled_jacobians
+from vhquad.mesh.closest import ClosestPoints
+from vhquad.mesh.quality import least_jacobians
+from vhquad.mesh.vectors import nearest_share
 from vhquad.quad.curves import CurveConstraints
-from vhquad.quad.lift import rim_vertices
+from vhquad.quad.lift import rim_vertices, wrong_quads
 
 __all__ = ["straddled"]
 
@@ -27,28 +28,31 @@ SAMPLES = 16  # of the curve over each edge
 POOR = 0.1  # scaled Jacobian that no quad may fall below, if it has not already
 
 
-def straddled(vertices: Floats, quads: Ints, curves: CurveConstraints) -> Floats:
+def straddled(
+    vertices: Floats, quads: Ints, surface: ClosestPoints, curves: CurveConstraints
+) -> Floats:
     """Positions from which edges are nearest to the creases that they run along.
 
     Parameters
     ----------
     vertices : (n, 3) float64
     quads : (k, 4) int64
+    surface : ClosestPoints
     curves : CurveConstraints
         Those on curves move, but for borders; the ends of open curves stay.
 
     Returns
     -------
     (n, 3) float64
-        A crease whose edges would not be nearer on average, or that would make quads poor, keeps
-        its vertices.
+        A crease whose edges would not be nearer on average, or that would make quads poor or turn
+        them against the surface, keeps its vertices.
     """
     on = np.flatnonzero(curves.curve >= 0)
     if len(on) == 0:
         return vertices
     arc = curves.locate(on, vertices[on])
     border = np.unique(curves.curve[rim_vertices(quads)])
-    before = _jacobians(vertices, quads)
+    before = least_jacobians(vertices, quads)
     out = vertices.copy()
     for c in np.setdiff1d(np.unique(curves.curve[on]), border):  # few
         own = on[curves.curve[on] == c]
@@ -60,8 +64,10 @@ def straddled(vertices: Floats, quads: Ints, curves: CurveConstraints) -> Floats
         trial = out.copy()
         trial[own[order]] = moved
         around = np.isin(quads, own).any(axis=1)
-        after = _jacobians(trial, quads[around])
-        if (after >= np.minimum(before[around], POOR)).all():
+        beside = quads[around]
+        poorer = least_jacobians(trial, beside) < np.minimum(before[around], POOR)
+        turned = wrong_quads(trial, beside, surface) & ~wrong_quads(out, beside, surface)
+        if not (poorer | turned).any():
             out = trial
     return out
 
@@ -103,12 +109,6 @@ def _projected(curves: CurveConstraints, own: Ints, s: Floats) -> Floats | None:
 def _off(points: Floats, a: Floats, b: Floats) -> float:
     """Mean distance of points (n, s, 3) from the edges of their rows, weighted by these' length."""
     side = b - a
-    squared = np.maximum((side**2).sum(axis=1), 1e-300)
-    share = np.einsum("nsi,ni->ns", points - a[:, None], side) / squared[:, None]
-    off = points - a[:, None] - np.clip(share, 0.0, 1.0)[..., None] * side[:, None]
-    return float(np.average(np.linalg.norm(off, axis=2).mean(axis=1), weights=np.sqrt(squared)))
-
-
-def _jacobians(vertices: Floats, quads: Ints) -> Floats:
-    """Least scaled Jacobian of each quad; (k,)."""
-    return np.asarray(scaled_jacobians(QuadMesh(vertices, quads)).min(axis=1))
+    share = nearest_share(points, a[:, None], side[:, None])
+    off = np.linalg.norm(points - a[:, None] - share[..., None] * side[:, None], axis=2)
+    return float(np.average(off.mean(axis=1), weights=np.linalg.norm(side, axis=1)))
