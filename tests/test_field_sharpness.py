@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.data_paths import data_file
-from tests.meshes import cube, grid, icosphere
+from tests.meshes import bored_block, cube, dome_on_square, grid, icosphere, torus
 from vhquad.field.features import dihedral_angles, find_creases, sharp_edges
 from vhquad.field.sharpness import chain_labels, side_angles
 from vhquad.mesh.load import load
@@ -37,6 +37,33 @@ def test_sides_of_a_known_bend() -> None:
     mesh = folded(1, np.radians(75))
     edges = sharp_edges(mesh, 40.0)
     np.testing.assert_allclose(np.degrees(side_angles(mesh, edges)), 75.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("n", [12, 32, 90])
+@pytest.mark.parametrize("lean", [0.0, 4.0, 6.0])
+def test_long_triangles_of_planes_hide_no_creases(n: int, lean: float) -> None:
+    """A block with a hole, straight or leaning, has 12 edges and two rims."""
+    mesh = bored_block(n, 8.0, lean)
+    assert mesh.euler_characteristic == 0
+    assert len(find_creases(mesh, 40.0)) == 12 + 2 * n == len(sharp_edges(mesh, 40.0))
+
+
+@pytest.mark.parametrize("n", [24, 48, 96])
+def test_long_triangles_beside_fine_ones_hide_no_crease(n: int) -> None:
+    """The rim of a dome on a square: it alone is sharp."""
+    mesh = dome_on_square(n)
+    found = mesh.vertices[find_creases(mesh, 40.0)]
+    assert len(found) == n
+    assert np.abs(found[..., 2]).max() == 0.0
+    assert (mesh.n_components, mesh.euler_characteristic) == (1, 1)
+
+
+@pytest.mark.parametrize("around", [(24, 8), (12, 8), (16, 8)])
+def test_rings_of_planar_quads_stay_round(around: tuple[int, int]) -> None:
+    """Of 8 sides across: an edge bends by 45 degrees, as do the next ones."""
+    mesh = torus(*around)
+    assert len(sharp_edges(mesh, 40.0)) >= around[0]
+    assert len(find_creases(mesh, 40.0)) == 0
 
 
 def test_noise_makes_no_creases() -> None:

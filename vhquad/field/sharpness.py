@@ -5,6 +5,9 @@ the surface all at once: the angle between the mean normals of its two sides, ov
 the angle of the edge itself. On noise the sides agree although the edge is sharp (the edge bends
 more than the surface around it); on a round fold the sides differ more than any one edge bends.
 Whole chains are judged, from one branching to the next, so that no crease is torn by an odd edge.
+
+What CAD programs export are planes in few long triangles beside fine ones. There the neighbourhood
+of an edge says nothing, and a plane for itself.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.triangle import TriMesh
 
 __all__ = ["LEAST_AROUND", "chain_labels", "is_sudden", "side_angles"]
@@ -26,6 +30,9 @@ Bools = NDArray[np.bool_]
 REACH = 1.5  # of the neighbourhood, in mean lengths of the edges around
 LEAST_AROUND = 0.85
 """Of the angle that a sharp edge has at least: by so much its two sides must differ."""
+LEVEL = 1e-3  # radians between two faces of a plane
+ROUNDEST = np.radians(65)  # more than an edge of a round fold of planar strips: six go round
+PROBES = (0.25, 0.5, 0.75)  # of an edge, where it is asked whether its sides are planar
 SHARE = (0.85, 1.2)  # of the bend that the edge itself may take on a crease
 
 
@@ -76,37 +83,95 @@ def chain_labels(mesh: TriMesh, pairs: Ints) -> Ints:
 def side_angles(mesh: TriMesh, edges: Ints) -> Floats:
     """Angle between the mean normals of the two sides of inner edges, near by; (k,), radians.
 
-    A face counts for the side towards which its centre lies, if it faces the same way at all.
+    Where a side is planar, its own normal is taken for the mean: the triangles of a plane are as
+    long as its borders are far apart, and what is as near as they are long may be anything.
     """
-    h = mesh.edge_halfedges[edges]
-    face = h // 3
+    face = mesh.edge_halfedges[edges] // 3
     own = mesh.face_normals[face]
-    start, end = mesh.vertices[mesh.edges[edges]].transpose(1, 0, 2)
-    middle = 0.5 * (start + end)
-    length = np.linalg.norm(end - start, axis=1, keepdims=True)
-    along = np.divide(end - start, length, out=np.zeros_like(start), where=length > 0)
-    radius = REACH * mesh.edge_lengths[face].mean(axis=(1, 2))
+    ends = mesh.vertices[mesh.edges[edges]]
+    span = ends[:, 1] - ends[:, 0]
+    length = np.linalg.norm(span, axis=1, keepdims=True)
+    along = np.divide(span, length, out=np.zeros_like(span), where=length > 0)
+    into = np.stack([np.cross(own[:, 0], along), -np.cross(own[:, 1], along)], axis=1)
+    planar = _are_planar(mesh, edges, face, into)
+    size = np.where(planar, 0.0, mesh.edge_lengths[face].mean(axis=2))
+    radius = REACH * size.sum(axis=1) / np.maximum((~planar).sum(axis=1), 1)
+    means = _mean_normals(mesh, face, ends.mean(axis=1), into, radius)
+    one, two = np.where(planar[..., None], own, means).transpose(1, 0, 2)
+    sine = np.linalg.norm(np.cross(one, two), axis=1)
+    return np.asarray(np.arctan2(sine, np.einsum("ki,ki->k", one, two)))
 
+
+def _mean_normals(
+    mesh: TriMesh, face: Ints, middle: Floats, into: Floats, radius: Floats
+) -> Floats:
+    """Normals of both sides of edges times area, summed over the faces near by; (k, 2, 3).
+
+    A face counts for the side towards which its centre lies, if it faces the same way at all.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+    face : (k, 2) int64
+        The faces beside each edge; they count always.
+    middle : (k, 3) float64
+    into : (k, 2, 3) float64
+        From each edge into its faces.
+    radius : (k,) float64
+        Of the neighbourhood around each middle.
+    """
+    k = len(face)
+    own = mesh.face_normals[face]
     centre = mesh.vertices[mesh.faces].mean(axis=1)
     near = cKDTree(centre).query_ball_point(middle, radius)
     count = np.array([len(found) for found in near])
-    edge = np.concatenate(
-        [np.repeat(np.arange(len(edges)), count), np.tile(np.arange(len(edges)), 2)]
-    )
+    edge = np.concatenate([np.repeat(np.arange(k), count), np.tile(np.arange(k), 2)])
     f = np.concatenate([*(np.asarray(found, dtype=np.int64) for found in near), face.T.reshape(-1)])
     offset = centre[f] - middle[edge]
-    into = [np.cross(own[:, 0], along), -np.cross(own[:, 1], along)]
-    depth = [np.einsum("ki,ki->k", offset, direction[edge]) for direction in into]
-    means: list[Floats] = []
+    depth = np.einsum("ki,ksi->sk", offset, into[edge])
+    means = np.zeros((k, 2, 3))
     for side, wins in ((0, depth[0] > depth[1]), (1, depth[1] >= depth[0])):
         normal = mesh.face_normals[f]
         agrees = np.einsum("ki,ki->k", normal, own[edge, side]) > 0
         weight = np.where(wins & agrees, mesh.face_areas[f], 0.0)
-        mean = [np.bincount(edge, weight * normal[:, i], len(edges)) for i in range(3)]
-        means.append(np.stack(mean, axis=1).astype(np.float64))
-    one, two = means
-    sine = np.linalg.norm(np.cross(one, two), axis=1)
-    return np.asarray(np.arctan2(sine, np.einsum("ki,ki->k", one, two)))
+        for i in range(3):
+            means[:, side, i] = np.bincount(edge, weight * normal[:, i], k)
+    return means
+
+
+def _are_planar(mesh: TriMesh, edges: Ints, face: Ints, into: Floats) -> Bools:
+    """Which sides of edges are planar for farther than the mesh has detail, or can only be so.
+
+    (k, 2).
+    """
+    label, several = _planes(mesh)
+    some = several[label[face]]
+    turn = np.abs(mesh.dihedral_angles[mesh.edge_halfedges[edges, 0]])
+    planar = np.repeat((some.all(axis=1) & (turn > ROUNDEST))[:, None], 2, axis=1)
+    edge, side = np.nonzero(some & ~planar)
+    if len(edge) == 0:
+        return planar
+    ends = mesh.vertices[mesh.edges[edges[edge]]]
+    reach = REACH * float(np.median(mesh.edge_lengths))
+    surface = ClosestPoints(mesh)
+    votes = np.zeros(len(edge), dtype=np.int64)
+    for share in PROBES:
+        at = (1.0 - share) * ends[:, 0] + share * ends[:, 1] + reach * into[edge, side]
+        hits = surface.query(at)
+        there = np.linalg.norm(hits.point - at, axis=1) < 1e-3 * reach
+        votes += there & (label[hits.face] == label[face[edge, side]])
+    planar[edge, side] = votes > len(PROBES) // 2
+    return planar
+
+
+def _planes(mesh: TriMesh) -> tuple[Ints, Bools]:
+    """Label of the planar region of each face, (m,), and which regions have several faces."""
+    h = np.flatnonzero(mesh.twin > np.arange(3 * mesh.n_faces))
+    level = h[np.abs(mesh.dihedral_angles[h]) < LEVEL]
+    ends = (level // 3, mesh.twin[level] // 3)
+    links = coo_matrix((np.ones(len(level), dtype=np.int8), ends), (mesh.n_faces, mesh.n_faces))
+    label = connected_components(links, directed=False)[1].astype(np.int64)
+    return label, np.asarray(np.bincount(label) > 1)
 
 
 def _weighted_medians(label: Ints, value: Floats, weight: Floats) -> Floats:
