@@ -19,6 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from vhquad.mesh.closest import ClosestPoints
+from vhquad.mesh.planes import plane_labels
 from vhquad.mesh.triangle import TriMesh
 
 __all__ = ["LEAST_AROUND", "chain_labels", "is_sudden", "side_angles"]
@@ -30,7 +31,6 @@ Bools = NDArray[np.bool_]
 REACH = 1.5  # of the neighbourhood, in mean lengths of the edges around
 LEAST_AROUND = 0.85
 """Of the angle that a sharp edge has at least: by so much its two sides must differ."""
-LEVEL = 1e-3  # radians between two faces of a plane
 ROUNDEST = np.radians(65)  # more than an edge of a round fold of planar strips: six go round
 PROBES = (0.25, 0.5, 0.75)  # of an edge, where it is asked whether its sides are planar
 SHARE = (0.85, 1.2)  # of the bend that the edge itself may take on a crease
@@ -144,8 +144,8 @@ def _are_planar(mesh: TriMesh, edges: Ints, face: Ints, into: Floats) -> Bools:
 
     (k, 2).
     """
-    label, several = _planes(mesh)
-    some = several[label[face]]
+    label = plane_labels(mesh)
+    some = label[face] >= 0
     turn = np.abs(mesh.dihedral_angles[mesh.edge_halfedges[edges, 0]])
     planar = np.repeat((some.all(axis=1) & (turn > ROUNDEST))[:, None], 2, axis=1)
     edge, side = np.nonzero(some & ~planar)
@@ -162,16 +162,6 @@ def _are_planar(mesh: TriMesh, edges: Ints, face: Ints, into: Floats) -> Bools:
         votes += there & (label[hits.face] == label[face[edge, side]])
     planar[edge, side] = votes > len(PROBES) // 2
     return planar
-
-
-def _planes(mesh: TriMesh) -> tuple[Ints, Bools]:
-    """Label of the planar region of each face, (m,), and which regions have several faces."""
-    h = np.flatnonzero(mesh.twin > np.arange(3 * mesh.n_faces))
-    level = h[np.abs(mesh.dihedral_angles[h]) < LEVEL]
-    ends = (level // 3, mesh.twin[level] // 3)
-    links = coo_matrix((np.ones(len(level), dtype=np.int8), ends), (mesh.n_faces, mesh.n_faces))
-    label = connected_components(links, directed=False)[1].astype(np.int64)
-    return label, np.asarray(np.bincount(label) > 1)
 
 
 def _weighted_medians(label: Ints, value: Floats, weight: Floats) -> Floats:

@@ -13,7 +13,9 @@ from vhquad.mesh.triangle import TriMesh
 from vhquad.quad.component import PAIRED
 from vhquad.quad.mapping import Progress
 from vhquad.quad.pipeline import RemeshResult, RemeshSettings, remesh_mesh
+from vhquad.quad.refined_planes import refine_planes
 from vhquad.quad.stand_in import StandIn, make_stand_in
+from vhquad.report import MeshCounts
 from vhquad.watch import Watch
 
 __all__ = ["Predicted", "remesh_predicted", "remesh_with"]
@@ -45,7 +47,7 @@ def remesh_predicted(
     watch: Watch | None = None,
     progress: Progress | None = None,
 ) -> Predicted:
-    """Predict a field and remesh by it, on a stand-in if the mesh is far finer than its quads.
+    """Predict a field and remesh by it, on a stand-in where the triangles do not suit the quads.
 
     Parameters
     ----------
@@ -53,8 +55,10 @@ def remesh_predicted(
     field_of : callable
         Gives the cross field of a mesh, told which mesh it stands for, if it is a stand-in.
     stand_in : bool
-        Whether a decimated copy may take the place of the mesh. It never does where the map was
-        asked for or a symmetry, and if no map is found on it, all is done again on the mesh.
+        Whether another mesh may take the place of this one: a decimated copy, if it is far finer
+        than its quads and neither the map was asked for nor a symmetry, or else a copy with its
+        planes refined, if their triangles are far larger. If no map is found on it, all is done
+        again on the mesh itself.
     cache : bool
         Keep the stand-in and continuous maps, and use those that were kept.
 
@@ -69,27 +73,33 @@ def remesh_predicted(
         guess = max(1, round(mesh.area / settings.edge_length**2))
     given = None if creases is None else np.asarray(creases, dtype=np.int64).reshape(-1, 2)
     copy: StandIn | None = None
-    if stand_in and not with_uv and settings.symmetry == "off":
-        with watch("stand-in"):
+    decimated = False
+    with watch("stand-in"):
+        if stand_in and not with_uv and settings.symmetry == "off":
             copy = make_stand_in(mesh, guess, given, settings.crease, cache)
+            decimated = copy is not None
+        if stand_in and copy is None:
+            copy = refine_planes(mesh, guess, given)
     if copy is not None:
         with watch("field"):
-            cross = field_of(copy.mesh, mesh)
+            cross = field_of(copy.mesh, mesh if decimated else None)
         result = remesh_with(
             copy.mesh,
             cross,
             settings,
             creases=copy.creases,
             density=None if density is None else copy.carry(np.asarray(density, dtype=np.float64)),
-            onto=mesh,
+            # The planes of a refined copy are the mesh's own, and its normals are better.
+            onto=mesh if decimated else None,
+            with_uv=with_uv,
             cache=cache,
             repair_lines=repair_lines,
             watch=watch,
             progress=progress,
         )
-        report = result.report
+        report = replace(result.report, input=MeshCounts.of(mesh), stand_in=copy.mesh.n_faces)
         if report.asked <= 2 * guess and all(p.method != PAIRED for p in report.components):
-            return Predicted(result, cross, copy.mesh)
+            return Predicted(replace(result, report=report), cross, copy.mesh)
     with watch("field"):
         cross = field_of(mesh, None)
     result = remesh_with(

@@ -49,19 +49,20 @@ _ARRAYS = ("vertices", "faces", "creases")
 
 @dataclass(frozen=True, eq=False)
 class StandIn:
-    """A decimated mesh and what it stands for.
+    """A mesh that is remeshed in place of another.
 
     Attributes
     ----------
     mesh : TriMesh
         As many components as the original, in its order, each of its topology.
-    creases : (k, 2) int64
-        Vertex pairs of the stand-in that lie on the creases of the original, edge for edge.
+    creases : (k, 2) int64 or None
+        Vertex pairs of the stand-in that lie on the creases of the original, edge for edge; None:
+        those of the stand-in itself.
     original : TriMesh
     """
 
     mesh: TriMesh
-    creases: Ints
+    creases: Ints | None
     original: TriMesh
 
     def carry(self, values: Floats) -> Floats:
