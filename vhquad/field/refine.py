@@ -66,21 +66,26 @@ def no_refinement(mesh: TriMesh) -> Refinement:
     )
 
 
-def split_edges(mesh: TriMesh, marked: Bools) -> Refinement:
-    """Split marked edges at their midpoints, at most one in a face, longest first.
+def split_edges(mesh: TriMesh, marked: Bools, priority: Floats | None = None) -> Refinement:
+    """Split marked edges at their midpoints, at most one in a face.
 
     Parameters
     ----------
     mesh : TriMesh
     marked : (ne,) bool
         Edges that may be split; call again with what is still to be split.
+    priority : (ne,) float64, optional
+        The edge with the highest goes first. Default: the length.
 
     Returns
     -------
     Refinement
         At least one marked edge was split, if there was one.
     """
-    chosen = _independent(mesh, marked)
+    if priority is None:
+        priority = np.zeros(mesh.n_edges)
+        priority[mesh.halfedge_edge] = mesh.edge_lengths.reshape(-1)
+    chosen = _independent(mesh, marked, priority)
     if chosen.size == 0:
         return no_refinement(mesh)
     ends = mesh.edges[chosen]
@@ -136,13 +141,11 @@ def split_faces(mesh: TriMesh, marked: Bools) -> Refinement:
     )
 
 
-def _independent(mesh: TriMesh, marked: Bools) -> Ints:
-    """Marked edges that are the longest marked one in each of their faces."""
+def _independent(mesh: TriMesh, marked: Bools, priority: Floats) -> Ints:
+    """Marked edges that are the first marked one in each of their faces."""
     edge_of = mesh.halfedge_edge.reshape(-1, 3)
-    length = np.zeros(mesh.n_edges)
-    length[edge_of] = mesh.edge_lengths
     rank = np.zeros(mesh.n_edges, dtype=np.int64)
-    rank[np.argsort(length, kind="stable")] = np.arange(1, mesh.n_edges + 1)
+    rank[np.argsort(priority, kind="stable")] = np.arange(1, mesh.n_edges + 1)
     rank[~marked] = 0
     in_face = rank[edge_of]
     beaten = in_face < in_face.max(axis=1, keepdims=True)
