@@ -2,10 +2,12 @@
 
     python benchmarks/make_suite.py generated OUT/
     python benchmarks/make_suite.py from-quads QUADS/ OUT/ --vertices 6000
+    python benchmarks/make_suite.py exported OUT/ --count 24
 
 `generated` writes closed and open shapes, many-handled, sharp, thin, noisy and many-parted ones.
 `from-quads` takes a folder of quad meshes, cuts each quad in two along a random diagonal and
-remeshes isotropically, so that no triangle edge tells where a quad was.
+remeshes isotropically, so that no triangle edge tells where a quad was. `exported` makes random
+machine parts in as few triangles as CAD programs export.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ import implicit
 import numpy as np
 import pymeshlab
 import solids
+from exported import random_part
 from numpy.typing import NDArray
 
 from vhquad.learn.augment import clip_triangles
@@ -235,6 +238,16 @@ def from_quads(quads: Path, folder: Path, count: int) -> None:
         write(folder / path.name, remeshed((fine.vertices, triangles), count))
 
 
+def exported(folder: Path, count: int) -> None:
+    rng, made = np.random.default_rng(0), 0
+    while made < count:
+        soup = random_part(rng)
+        mesh = TriMesh(*soup)
+        if mesh.n_components == 1 and mesh.has_manifold_vertices:
+            write(folder / f"part_{made:02}.obj", soup)
+            made += 1
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     kinds = parser.add_subparsers(dest="kind", required=True)
@@ -244,10 +257,15 @@ def main() -> None:
     quads.add_argument("quads", type=Path)
     quads.add_argument("out", type=Path)
     quads.add_argument("--vertices", type=int, default=6000)
+    parts = kinds.add_parser("exported", help="random machine parts")
+    parts.add_argument("out", type=Path)
+    parts.add_argument("--count", type=int, default=24)
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     if options.kind == "generated":
         generated(options.out)
+    elif options.kind == "exported":
+        exported(options.out, options.count)
     else:
         from_quads(options.quads, options.out, options.vertices)
 
