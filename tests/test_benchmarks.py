@@ -18,6 +18,7 @@ from vhquad.mesh.triangle import TriMesh
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
 import bars
+import exported
 import judge
 import remesh_folder
 import summary
@@ -55,6 +56,18 @@ def test_cube_has_eight_corners_on_its_creases(tmp_path: Path) -> None:
     # The four creases at the top and at the bottom, 8 of 12, are 0.05 sides off, the other four
     # only where nothing is left beside them.
     assert found["crease_off"] == pytest.approx(100 * 0.05 / np.sqrt(3) * 8 / 12, rel=0.06)
+
+
+def test_random_parts_are_closed_and_repeat() -> None:
+    """But for how the triangles of a plane lie, which is up to the booleans."""
+    for seed in range(3):
+        vertices, faces = exported.random_part(np.random.default_rng(seed))
+        mesh = TriMesh(vertices, faces)
+        assert len(mesh.boundary_loops) == 0
+        assert mesh.face_areas.max() > 10 * np.median(mesh.face_areas)
+        again = TriMesh(*exported.random_part(np.random.default_rng(seed)))
+        assert again.area == pytest.approx(mesh.area, rel=1e-9)
+        assert again.n_faces == mesh.n_faces
 
 
 def test_triangles_without_area_make_no_creases() -> None:
