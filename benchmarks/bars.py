@@ -6,13 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["BARS", "CAD", "Bar", "Result", "figures_of", "is_valid"]
+__all__ = ["BARS", "Bar", "Result", "figures_of", "is_cad", "is_valid"]
 
 Result = dict[str, Any]
 
 _SHAPES = {"cube", "bracket_made", "stepped_block", "cone", "hexagon", "gear", "thin_plate"}
-CAD = frozenset({"cad_bracket", "cad_cube_bored", "wingnut", *_SHAPES})
-"""Meshes whose creases are meant."""
+_CAD = frozenset({"cad_bracket", "cad_cube_bored", "wingnut", *_SHAPES})
 
 FIRST = ("integer-grid map", "integer-grid map, smoother field")
 
@@ -64,6 +63,11 @@ def faults(run: Result) -> float:
     """Faults of an all-quad manifold of the input's topology."""
     figures = figures_of(run)
     return sum(figures[name] for name in FAULTS) + (not figures["kept"])
+
+
+def is_cad(run: Result) -> bool:
+    """Whether the creases of the mesh are meant."""
+    return run["mesh"] in _CAD or run["folder"] == "exported"
 
 
 def is_valid(run: Result) -> bool:
@@ -161,7 +165,7 @@ BARS = (
     Bar(
         "2,000 and 8,000, CAD: mean from crease to edge (% of the diagonal)",
         1.0,
-        lambda r: dense(r) and r["mesh"] in CAD,
+        lambda r: dense(r) and is_cad(r),
         lambda r: figures_of(r).get("crease_off", 100.0),
         0.02,
     ),

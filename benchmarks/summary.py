@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from statistics import mean, median
 
-from bars import BARS, CAD, Result, figures_of, is_valid
+from bars import BARS, Result, figures_of, is_cad, is_valid
 from remesh_folder import OURS, TOOLS, load
 
 Row = Sequence[str]
@@ -73,7 +73,7 @@ def column(runs: list[Result]) -> list[str]:
     """The figures of one tool."""
     made = [run for run in runs if figures_of(run)]
     rims = [run for run in made if "border_off" in figures_of(run)]
-    cad = [run for run in made if run["mesh"] in CAD and "crease_off" in figures_of(run)]
+    cad = [run for run in made if is_cad(run) and "crease_off" in figures_of(run)]
     return [
         f"{len(made)} of {len(runs)}",
         str(sum(is_valid(run) for run in runs)),
