@@ -153,13 +153,15 @@ def _are_planar(mesh: TriMesh, edges: Ints, face: Ints, into: Floats) -> Bools:
         return planar
     ends = mesh.vertices[mesh.edges[edges[edge]]]
     reach = REACH * float(np.median(mesh.edge_lengths))
-    surface = ClosestPoints(mesh)
+    own = label[face[edge, side]]
+    planes = np.isin(label, own)
+    surface, label = ClosestPoints(mesh.submesh(planes)[0]), label[planes]
     votes = np.zeros(len(edge), dtype=np.int64)
     for share in PROBES:
         at = (1.0 - share) * ends[:, 0] + share * ends[:, 1] + reach * into[edge, side]
         hits = surface.query(at)
         there = np.linalg.norm(hits.point - at, axis=1) < 1e-3 * reach
-        votes += there & (label[hits.face] == label[face[edge, side]])
+        votes += there & (label[hits.face] == own)
     planar[edge, side] = votes > len(PROBES) // 2
     return planar
 

@@ -45,8 +45,8 @@ class Attempt:
         Crease edges that edges of quads follow.
     quads : float
         That the map is made for.
-    is_last_resort : bool
-        Whether creases may be given up for it.
+    may_give_up : bool
+        Whether single creases may be given up for it.
     """
 
     name: str
@@ -54,7 +54,7 @@ class Attempt:
     cancel: float
     creases: Ints
     quads: float
-    is_last_resort: bool
+    may_give_up: bool
 
 
 @dataclass(frozen=True)

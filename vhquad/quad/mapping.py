@@ -75,7 +75,7 @@ class _FoldedMap(ParametrizationError):
 def map_to_quads(wish: Component, attempt: Attempt, watch: Watch, tell: Progress) -> MappedQuads:
     """Quads by a map, their vertices where the map has them.
 
-    Where triangles of the map of a last resort stay folded, creases beside these are given up.
+    Where triangles of the map stay folded, creases beside these are given up, if the attempt may.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def map_to_quads(wish: Component, attempt: Attempt, watch: Watch, tell: Progress
         creases = attempt.creases
         beside = BESIDE * float(np.sqrt(wish.mesh.area / attempt.quads))
         kept = creases[~_are_near(wish.mesh.vertices[creases], folded.places, beside)]
-        if not (attempt.is_last_resort and 0 < len(kept) < len(creases)):
+        if not (attempt.may_give_up and 0 < len(kept) < len(creases)):
             raise
     fewer = replace(attempt, name=f"{MAP}, some creases", creases=kept)
     return _by_map(wish, fewer, watch, tell)
