@@ -9,6 +9,7 @@ side on the meshes that all of them were given) and ``runs.md`` (a line for ever
 from __future__ import annotations
 
 import argparse
+import os
 from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -169,15 +170,16 @@ TITLES = {
 }
 
 
-def heading(name: str, runs: list[Result]) -> list[str]:
-    """Title, commands and what was run."""
+def heading(name: str, runs: list[Result], out: Path) -> list[str]:
+    """Title, commands and what was run, of a file in a folder."""
+    about = Path(os.path.relpath(Path(__file__).with_name("README.md"), out)).as_posix()
     count = Counter((run["target"], run["tool"]) for run in runs)
     said = [f"{n} x {tool} at {target}" for (target, tool), n in sorted(count.items())]
     commits = sorted({run["commit"] for run in runs if run["tool"] in OURS})
     return [
         f"# {TITLES[name]}",
         "",
-        "Made by `make_suite.py`, `remesh_folder.py` and `summary.py`, see [README.md](README.md);",
+        f"Made by `make_suite.py`, `remesh_folder.py` and `summary.py`, see [README.md]({about});",
         "one thread a run; CPU time and memory are those of the whole process, start included.",
         "",
         f"Runs: {', '.join(said)}. Commits: {', '.join(commits)}.",
@@ -201,7 +203,7 @@ def main() -> None:
     }
     options.out.mkdir(parents=True, exist_ok=True)
     for name, lines in texts.items():
-        text = "\n".join([*heading(name, runs), "", *lines])
+        text = "\n".join([*heading(name, runs, options.out), "", *lines])
         (options.out / f"{name}.md").write_text(text.rstrip() + "\n")
 
 
