@@ -83,9 +83,14 @@ class IntrinsicTriangulation:
         return intrinsic.areas(self.lengths)
 
     @cached_property
+    def halfedge_weights(self) -> Floats:
+        """What the face of each halfedge adds to the cotan weight of its edge; (3m,)."""
+        return np.asarray(0.5 * np.roll(self.cotangents, -2, axis=1).reshape(-1))
+
+    @cached_property
     def edge_weights(self) -> Floats:
         """Cotan weight of the edge of each halfedge, from both of its faces; (3m,)."""
-        half = 0.5 * np.roll(self.cotangents, -2, axis=1).reshape(-1)
+        half = self.halfedge_weights
         return half + np.where(self.twin >= 0, half[self.twin], 0.0)
 
 

@@ -1,7 +1,10 @@
 """Cotan and connection Laplacians, lumped mass, gradient, and implicit heat diffusion.
 
-All are positive semidefinite and are built from an intrinsic triangulation; take the Delaunay one
-(``vhquad.geometry.delaunay``), whose weights are not negative.
+All are built from an intrinsic triangulation; take the Delaunay one (``vhquad.geometry.delaunay``),
+whose weights are not negative inside. At a border they may be: a triangle with an obtuse angle
+opposite to its boundary edge gives that a negative one. The cotan Laplacian is positive
+semidefinite even so. The connection Laplacian is not, as the frames of border vertices turn around
+the triangle: it gets no negative weights.
 """
 
 from __future__ import annotations
@@ -34,14 +37,15 @@ def lumped_mass(tri: IntrinsicTriangulation) -> Floats:
 
 def cotan_laplacian(tri: IntrinsicTriangulation) -> csr_matrix:
     """Scalar Laplacian; (n, n) float64, symmetric positive semidefinite, integrated (no mass)."""
-    return _assemble(tri, np.ones(tri.faces.size))
+    return _assemble(tri, tri.halfedge_weights, np.ones(tri.faces.size))
 
 
 def connection_laplacian(tri: IntrinsicTriangulation, order: int = 1) -> csr_matrix:
-    """Connection Laplacian of order-N fields; (n, n) complex128, Hermitian.
+    """Connection Laplacian of order-N fields; (n, n) complex128, Hermitian, semidefinite.
 
-    ``(L u)_i = sum_j w_ij (u_i - r_ji^N u_j)`` with the cotan weights w. (Eq. 3 of the paper prints
-    ``r_ij`` in row i, column j, which must be read as the rotation that brings j's vector to i.)
+    ``(L u)_i = sum_j w_ij (u_i - r_ji^N u_j)`` with the cotan weights w, those of boundary edges
+    not below 0. (Eq. 3 of the paper prints ``r_ij`` in row i, column j, which must be read as the
+    rotation that brings j's vector to i.)
 
     Parameters
     ----------
@@ -53,12 +57,15 @@ def connection_laplacian(tri: IntrinsicTriangulation, order: int = 1) -> csr_mat
     ----------
     "Vector Heat Network", eq. 3; Knoeppel et al. 2013; Sharp et al. 2019.
     """
-    return _assemble(tri, tri.transport**order)
+    inside = tri.twin >= 0
+    weight = np.where(inside, tri.halfedge_weights, np.maximum(tri.halfedge_weights, 0.0))
+    return _assemble(tri, weight, tri.transport**order)
 
 
-def _assemble(tri: IntrinsicTriangulation, rotation: Floats | Complexes) -> csr_matrix:
+def _assemble(
+    tri: IntrinsicTriangulation, weight: Floats, rotation: Floats | Complexes
+) -> csr_matrix:
     """Sum the weights of all halfedges; ``rotation[h]`` takes the tail's value to the head."""
-    weight = 0.5 * np.roll(tri.cotangents, -2, axis=1).reshape(-1)
     tail = tri.faces.reshape(-1)
     head = np.roll(tri.faces, -1, axis=1).reshape(-1)
     rows = np.concatenate([head, tail, tail, head])

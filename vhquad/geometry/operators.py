@@ -27,7 +27,7 @@ __all__ = [
     "load_or_build",
 ]
 
-OPERATORS_VERSION = 4
+OPERATORS_VERSION = 5
 """Raised whenever the same mesh and settings give other operators; old cache entries then rest."""
 
 _ARRAYS = ("mass", "eigenvalues", "eigenvectors", "features", "lines")
