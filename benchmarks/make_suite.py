@@ -23,6 +23,7 @@ import solids
 from exported import random_part
 from numpy.typing import NDArray
 
+from vhquad.errors import MeshError
 from vhquad.learn.augment import clip_triangles
 from vhquad.learn.subdivide import catmull_clark
 from vhquad.learn.targets import split_quads
@@ -242,7 +243,10 @@ def exported(folder: Path, count: int) -> None:
     rng, made = np.random.default_rng(0), 0
     while made < count:
         soup = random_part(rng)
-        mesh = TriMesh(*soup)
+        try:
+            mesh = TriMesh(*soup)
+        except MeshError:  # what a boolean now and then makes of faces that nearly coincide
+            continue
         if mesh.n_components == 1 and mesh.has_manifold_vertices:
             write(folder / f"part_{made:02}.obj", soup)
             made += 1

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from tests.data_paths import data_file
-from tests.meshes import bored_block, cube, dome_on_square, grid, icosphere, torus
+from tests.exports import bored_block, dome_on_square
+from tests.meshes import cube, grid, icosphere, torus
 from vhquad.field.features import dihedral_angles, find_creases, sharp_edges
 from vhquad.field.sharpness import chain_labels, side_angles
 from vhquad.mesh.load import load

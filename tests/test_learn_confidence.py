@@ -66,14 +66,14 @@ def test_heads_are_known_balls_are_not(shipped: Model) -> None:
     """4. The head in examples/ against a ball, on which nothing tells; of a cube its edges tell."""
     head = api.load(ROOT / "examples" / "head.obj").mesh
     assert mean(head, predict_field(head, shipped)) > 0.95
-    ball, block = icosphere(3), cube(8)
+    ball, block = icosphere(3), cube(12)
     assert mean(ball, predict_field(ball, shipped, cache=False)) < 0.05
     field = predict_field(block, shipped, cache=False)
     assert field.confidence is not None
     assert mean(block, field) < 0.5
     on_faces = (np.abs(np.abs(block.vertices) - 0.5) < 1e-9).sum(axis=1) == 1
-    some = on_faces & (field.confidence > np.median(field.confidence[on_faces]))
-    assert field.confidence[some].min() > 0.15
+    some = on_faces & (field.confidence > 0.2)
+    assert some.sum() > 0.5 * on_faces.sum()
     arm = to_3d(np.exp(0.25j * np.angle(field.z)), vertex_axes(block))[some]
     assert np.degrees(np.arccos(np.abs(arm).max(axis=1))).mean() < 8.0  # 22.5 by chance
 

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from tests import meshes
+from tests import exports, meshes
 from vhquad.field.baseline import curvature_field
 from vhquad.field.cross import CrossField
 from vhquad.field.features import find_creases
@@ -18,7 +18,7 @@ from vhquad.quad.pipeline import RemeshSettings
 from vhquad.quad.refined_planes import LONGEST, refine_planes
 from vhquad.quad.remeshing import remesh_predicted
 
-BLOCK = meshes.bored_block(24, 8.0, 4.0)
+BLOCK = exports.bored_block(24, 8.0, 4.0)
 SHAPES = {
     "cube": meshes.cube(1),
     "block": BLOCK,

@@ -33,6 +33,7 @@ LEAST_AROUND = 0.85
 """Of the angle that a sharp edge has at least: by so much its two sides must differ."""
 ROUNDEST = np.radians(65)  # more than an edge of a round fold of planar strips: six go round
 PROBES = (0.25, 0.5, 0.75)  # of an edge, where it is asked whether its sides are planar
+ON_PLANE = 1e-3  # of the reach: how far from a plane a point is still on it
 SHARE = (0.85, 1.2)  # of the bend that the edge itself may take on a crease
 
 
@@ -160,7 +161,7 @@ def _are_planar(mesh: TriMesh, edges: Ints, face: Ints, into: Floats) -> Bools:
     for share in PROBES:
         at = (1.0 - share) * ends[:, 0] + share * ends[:, 1] + reach * into[edge, side]
         hits = surface.query(at)
-        there = np.linalg.norm(hits.point - at, axis=1) < 1e-3 * reach
+        there = np.linalg.norm(hits.point - at, axis=1) < ON_PLANE * reach
         votes += there & (label[hits.face] == own)
     planar[edge, side] = votes > len(PROBES) // 2
     return planar

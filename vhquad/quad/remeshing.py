@@ -97,7 +97,9 @@ def remesh_predicted(
             watch=watch,
             progress=progress,
         )
-        report = replace(result.report, input=MeshCounts.of(mesh), stand_in=copy.mesh.n_faces)
+        report = result.report
+        if not decimated:
+            report = replace(report, input=MeshCounts.of(mesh), stand_in=copy.mesh.n_faces)
         if report.asked <= 2 * guess and all(p.method != PAIRED for p in report.components):
             return Predicted(replace(result, report=report), cross, copy.mesh)
     with watch("field"):
