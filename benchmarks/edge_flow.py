@@ -18,6 +18,7 @@ from __future__ import annotations
 import argparse
 import json
 import tempfile
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,7 +33,8 @@ from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.io import read_quad_mesh
 from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.triangle import TriMesh
-from vhquad.quad.pipeline import RemeshSettings, remesh_mesh
+from vhquad.quad.pipeline import RemeshSettings
+from vhquad.quad.remeshing import remesh_predicted
 
 LIMIT = 180  # CPU seconds a run
 
@@ -77,14 +79,17 @@ class Artist:
         return angle, np.linalg.norm(side, axis=1)
 
 
-def hidden(mesh: QuadMesh, n_vertices: int) -> tuple[TriMesh, CrossField]:
-    """The same surface in triangles that do not tell the quads, and the quads' field on them."""
+def hidden(mesh: QuadMesh, n_vertices: int) -> tuple[TriMesh, Callable[..., CrossField]]:
+    """The same surface in triangles that do not tell the quads, and the quads' field on any."""
     fine = catmull_clark(mesh.vertices, mesh.quads)
     triangles, source, slots = split_quads(fine.quads, np.random.default_rng(1))
-    made = isotropic_remesh(fine.vertices, triangles, n_vertices)
     surface = TriMesh(fine.vertices, triangles)
-    field = truth_at(made, surface, fine, source, slots)
-    return made, replace(field, confidence=np.ones(len(field)))  # to be followed everywhere
+
+    def field_of(copy: TriMesh, _: TriMesh | None = None) -> CrossField:
+        field = truth_at(copy, surface, fine, source, slots)
+        return replace(field, confidence=np.ones(len(field)))  # to be followed everywhere
+
+    return isotropic_remesh(fine.vertices, triangles, n_vertices), field_of
 
 
 def write_triangles(path: Path, mesh: TriMesh) -> None:
@@ -129,7 +134,7 @@ def main() -> None:
             means["the artist's own"].append(artist.means(mesh))
             row = [path.stem, cell(means["the artist's own"][-1], mesh)]
             source, out = folder / "triangles.obj", folder / "quads.obj"
-            triangles, field = hidden(mesh, options.vertices)
+            triangles, field_of = hidden(mesh, options.vertices)
             write_triangles(source, triangles)
             for tool in options.tools:
                 out.unlink(missing_ok=True)
@@ -142,7 +147,7 @@ def main() -> None:
                 means[tool].append(artist.means(made))
                 row.append(cell(means[tool][-1], made))
             settings = RemeshSettings(target_quads=mesh.n_quads)
-            made = remesh_mesh(triangles, field, settings).quads
+            made = remesh_predicted(triangles, field_of, settings).result.quads
             means["artist's field"].append(artist.means(made))
             row.append(cell(means["artist's field"][-1], made))
             rows.append(row)

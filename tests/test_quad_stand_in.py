@@ -12,7 +12,7 @@ from vhquad import api
 from vhquad.field.cross import CrossField
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.triangle import TriMesh
-from vhquad.quad import remeshing, stand_in
+from vhquad.quad import place, stand_in
 from vhquad.quad.pipeline import RemeshSettings
 from vhquad.quad.remeshing import remesh_predicted
 from vhquad.quad.stand_in import StandIn, make_stand_in
@@ -176,7 +176,7 @@ def test_what_cannot_be_mapped_on_a_stand_in_is_done_again(
 ) -> None:
     mesh = meshes.icosphere(4)
     monkeypatch.setattr(stand_in, "FEWEST_FACES", 1000)
-    monkeypatch.setattr(remeshing, "GUESSED_QUADS", 20)  # the field asks for far more
+    monkeypatch.setattr(place, "GUESSED_QUADS", 20)  # the field asks for far more
     asked = []
 
     def field_of(surface: TriMesh, of: TriMesh | None) -> CrossField:

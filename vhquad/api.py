@@ -162,8 +162,8 @@ def remesh(
     symmetry : str
         "x", "y", "z" or "auto" for quads that are their own mirror image; "off".
     resolution : "auto" or "full"
-        "auto" predicts on decimated copies of large components, and maps a decimated copy of a mesh
-        far finer than its quads; either way quads lie on the mesh itself.
+        "auto" predicts on decimated copies of large components, and maps a copy of a mesh far finer
+        than its quads, or too coarse for them; either way quads lie on the mesh itself.
     seed : int
         The same seed gives the same quads.
     progress : callable, optional

@@ -51,7 +51,7 @@ FullResolution = Annotated[
     bool,
     typer.Option(
         "--full-resolution",
-        help="Work on the mesh itself, however large, not on decimated copies.",
+        help="Work on the mesh itself, not on a copy whose triangles suit the quads.",
     ),
 ]
 NoCache = Annotated[

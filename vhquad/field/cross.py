@@ -72,6 +72,11 @@ class CrossField:
         return len(self.z)
 
     @property
+    def trust(self) -> NDArray[np.float64]:
+        """Of :func:`trust_in`; none in a field that does not say how sure it is; (n,)."""
+        return np.zeros(len(self)) if self.confidence is None else trust_in(self.confidence)
+
+    @property
     def angle(self) -> NDArray[np.float64]:
         """Angle of one of the four directions in the element's frame, in (-pi/4, pi/4]; (n,)."""
         return np.asarray(np.angle(self.z) / 4.0)

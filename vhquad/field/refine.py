@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from vhquad.field.dual import face_angles
 from vhquad.mesh.triangle import TriMesh, next_halfedge, prev_halfedge
 
-__all__ = ["Refinement", "no_refinement", "split_edges", "split_faces"]
+__all__ = ["Refinement", "lengths_of_edges", "no_refinement", "split_edges", "split_faces"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -83,8 +83,7 @@ def split_edges(mesh: TriMesh, marked: Bools, priority: Floats | None = None) ->
         At least one marked edge was split, if there was one.
     """
     if priority is None:
-        priority = np.zeros(mesh.n_edges)
-        priority[mesh.halfedge_edge] = mesh.edge_lengths.reshape(-1)
+        priority = lengths_of_edges(mesh)
     chosen = _independent(mesh, marked, priority)
     if chosen.size == 0:
         return no_refinement(mesh)
@@ -108,6 +107,13 @@ def split_edges(mesh: TriMesh, marked: Bools, priority: Floats | None = None) ->
     source[face] = np.stack([h, none, before], axis=1)
     vertices = np.concatenate([mesh.vertices, mesh.vertices[ends].mean(axis=1)])
     return Refinement(TriMesh(vertices, faces), parent, turn, source.reshape(-1))
+
+
+def lengths_of_edges(mesh: TriMesh) -> Floats:
+    """Length of each edge; (ne,)."""
+    length = np.zeros(mesh.n_edges)
+    length[mesh.halfedge_edge] = mesh.edge_lengths.reshape(-1)
+    return length
 
 
 def split_faces(mesh: TriMesh, marked: Bools) -> Refinement:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vhquad.field.features import crease_halfedges
-from vhquad.field.refine import split_edges
+from vhquad.field.refine import lengths_of_edges, split_edges
 from vhquad.mesh.flips import flip_edges
 from vhquad.mesh.planes import plane_labels
 from vhquad.mesh.triangle import TriMesh
@@ -59,7 +59,7 @@ def refine_planes(mesh: TriMesh, n_quads: int, creases: Ints | None = None) -> S
         if not long.any():
             break
         # Of edges about as long any may go first: by length alone those of a fan would queue up.
-        grade = np.floor(GRADES * np.log2(_lengths(copy)))
+        grade = np.floor(GRADES * np.log2(lengths_of_edges(copy)))
         step = split_edges(copy, long, grade + rng.random(copy.n_edges))
         if lines is not None:
             flag = step.carry(crease_halfedges(copy, lines), False)
@@ -68,18 +68,12 @@ def refine_planes(mesh: TriMesh, n_quads: int, creases: Ints | None = None) -> S
     return StandIn(copy, lines, mesh)
 
 
-def _lengths(mesh: TriMesh) -> NDArray[np.float64]:
-    """Of the edges; (ne,)."""
-    ends = mesh.vertices[mesh.edges]
-    return np.asarray(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
-
-
 def _long(mesh: TriMesh, plane: Ints, longest: float) -> Bools:
     """Edges of large faces of planes that are longer than so; (ne,)."""
     found = np.zeros(mesh.n_edges, dtype=bool)
     large = (plane >= 0) & (mesh.face_areas > LEAST_AREA * longest**2)
     found[mesh.halfedge_edge[np.repeat(large, 3)]] = True
-    return np.asarray(found & (_lengths(mesh) > longest))
+    return np.asarray(found & (lengths_of_edges(mesh) > longest))
 
 
 def _kept(mesh: TriMesh, plane: Ints, lines: Ints | None) -> Ints:

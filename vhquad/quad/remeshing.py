@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,14 +13,11 @@ from vhquad.mesh.triangle import TriMesh
 from vhquad.quad.component import PAIRED
 from vhquad.quad.mapping import Progress
 from vhquad.quad.pipeline import RemeshResult, RemeshSettings, remesh_mesh
-from vhquad.quad.refined_planes import refine_planes
-from vhquad.quad.stand_in import StandIn, make_stand_in
+from vhquad.quad.place import Chosen, Place, choose_place, guessed_quads
 from vhquad.report import MeshCounts
 from vhquad.watch import Watch
 
 __all__ = ["Predicted", "remesh_predicted", "remesh_with"]
-
-GUESSED_QUADS = 10_000  # where only the field will say; predicted sizes make fewer, as a rule
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,10 +52,11 @@ def remesh_predicted(
     field_of : callable
         Gives the cross field of a mesh, told which mesh it stands for, if it is a stand-in.
     stand_in : bool
-        Whether another mesh may take the place of this one: a decimated copy, if it is far finer
-        than its quads and neither the map was asked for nor a symmetry, or else a copy with its
-        planes refined, if their triangles are far larger. If no map is found on it, all is done
-        again on the mesh itself.
+        Whether another mesh may take the place of this one: a copy with its planes refined, if
+        their triangles are far larger than its quads. And if neither the map was asked for nor a
+        symmetry: a decimated copy, if the mesh is far finer, or one with its curved surfaces
+        refined, if it is not finer at all. If no map is found on it, all is done again on the mesh
+        itself.
     cache : bool
         Keep the stand-in and continuous maps, and use those that were kept.
 
@@ -66,57 +64,47 @@ def remesh_predicted(
     """
     settings = settings or RemeshSettings()
     watch = watch or Watch()
-    guess = GUESSED_QUADS
-    if settings.target_quads is not None:
-        guess = settings.target_quads
-    elif settings.edge_length is not None:
-        guess = max(1, round(mesh.area / settings.edge_length**2))
     given = None if creases is None else np.asarray(creases, dtype=np.int64).reshape(-1, 2)
-    copy: StandIn | None = None
-    decimated = False
-    with watch("stand-in"):
-        if stand_in and not with_uv and settings.symmetry == "off":
-            copy = make_stand_in(mesh, guess, given, settings.crease, cache)
-            decimated = copy is not None
-        if stand_in and copy is None:
-            copy = refine_planes(mesh, guess, given)
-    if copy is not None:
-        with watch("field"):
-            cross = field_of(copy.mesh, mesh if decimated else None)
-        result = remesh_with(
-            copy.mesh,
+    factor = None if density is None else np.asarray(density, dtype=np.float64)
+    itself = Place(mesh, given, factor)
+    chosen: Chosen | None = None
+    if stand_in:
+        whole = not with_uv and settings.symmetry == "off"
+        chosen = choose_place(itself, field_of, settings, whole, cache, watch)
+
+    def made(place: Place, cross: CrossField, settings: RemeshSettings) -> RemeshResult:
+        return remesh_with(
+            place.mesh,
             cross,
             settings,
-            creases=copy.creases,
-            density=None if density is None else copy.carry(np.asarray(density, dtype=np.float64)),
-            # The planes of a refined copy are the mesh's own, and its normals are better.
-            onto=mesh if decimated else None,
+            creases=place.creases,
+            density=place.density,
+            onto=place.onto,
             with_uv=with_uv,
             cache=cache,
             repair_lines=repair_lines,
             watch=watch,
             progress=progress,
         )
-        report = result.report
-        if not decimated:
-            report = replace(report, input=MeshCounts.of(mesh), stand_in=copy.mesh.n_faces)
-        if report.asked <= 2 * guess and all(p.method != PAIRED for p in report.components):
-            return Predicted(replace(result, report=report), cross, copy.mesh)
-    with watch("field"):
-        cross = field_of(mesh, None)
-    result = remesh_with(
-        mesh,
-        cross,
-        settings,
-        creases=given,
-        density=density,
-        with_uv=with_uv,
-        cache=cache,
-        repair_lines=repair_lines,
-        watch=watch,
-        progress=progress,
-    )
-    return Predicted(result, cross, mesh)
+
+    if chosen is not None and chosen.place is not itself:
+        result = made(chosen.place, chosen.field, chosen.settings)
+        report = replace(
+            result.report,
+            input=MeshCounts.of(mesh),
+            stand_in=chosen.place.mesh.n_faces,
+            settings=asdict(settings),
+        )
+        suits = report.asked <= 2 * guessed_quads(mesh, chosen.settings)
+        if suits and all(p.method != PAIRED for p in report.components):
+            return Predicted(replace(result, report=report), chosen.field, chosen.place.mesh)
+        chosen = None
+    if chosen is None:
+        with watch("field"):
+            cross = field_of(mesh, None)
+    else:
+        cross = chosen.field
+    return Predicted(made(itself, cross, settings), cross, mesh)
 
 
 def remesh_with(

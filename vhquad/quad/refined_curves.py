@@ -1,0 +1,129 @@
+"""A stand-in with triangles no longer than its quads, on a smooth surface through the vertices.
+
+A field and its map are no finer than the triangles they live on, and what these know of the surface
+ends at their edges: all curvature sits at the vertices. Where quads are as small as triangles, and
+the field is sure of its detail, edges are split, and the new vertices lifted to the curved patches
+of :mod:`vhquad.mesh.pn_triangles`. (Without that, splitting does harm.) The quads are polished on
+the original surface in the end, and judged against it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vhquad.field.creases import creases_for_quads
+from vhquad.field.features import crease_halfedges
+from vhquad.field.refine import Refinement, lengths_of_edges, no_refinement, split_edges
+from vhquad.mesh.pn_triangles import PnTriangles
+from vhquad.mesh.triangle import TriMesh
+from vhquad.quad.stand_in import StandIn
+
+__all__ = ["refine_curves"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+LONGEST = 0.8  # edge, in quad edges
+WORTH_FROM = 0.05  # of the quads on triangles with longer ones
+MOST = 15_000  # vertices: the network sees no more of a component
+SURE, KNOWN = 0.5, 0.8  # trust in the field of a face; share of a part that has as much
+ROUNDS = 100
+THIN = 1e-12  # square of the area, by the length to the fourth: a triangle that is a line
+
+
+def refine_curves(
+    mesh: TriMesh,
+    length: Floats,
+    trust: Floats,
+    creases: Ints | None = None,
+    angle: float | None = None,
+) -> StandIn | None:
+    """A copy of a mesh with no edge that is much longer than the quads there are to be.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+        Sound, any components and borders.
+    length : (n,) float64
+        Wanted length of quad edges near each vertex.
+    trust : (m,) float64
+        In the directions of the field at the faces. Parts of which the field is not sure are left
+        alone.
+    creases : (k, 2) int64, optional
+        Edges that quads must follow, in place of those sharper than the angle. They stay straight,
+        as borders do.
+    angle : float, optional
+        In degrees; no creases if neither is given.
+
+    Returns
+    -------
+    StandIn or None
+        None where triangles are fine enough.
+    """
+    quads = mesh.face_areas / np.exp(2.0 * np.log(length)[mesh.faces].mean(axis=1))
+    longest = LONGEST * length
+    sure = np.bincount(mesh.face_component, quads * (trust > SURE))
+    known = (sure > KNOWN * np.bincount(mesh.face_component, quads))[mesh.face_component]
+    long = _excess(mesh, longest, known) > 0
+    coarse = long[mesh.halfedge_edge].reshape(-1, 3).any(axis=1)
+    if mesh.n_vertices > MOST or quads[coarse].sum() < WORTH_FROM * quads.sum():
+        return None
+    lines = creases
+    if lines is None and angle is not None:
+        edge = float(np.sqrt(mesh.area / quads.sum()))
+        lines = creases_for_quads(mesh, angle, edge, trust=trust)
+    sharp = crease_halfedges(mesh, lines)
+    done = no_refinement(mesh)
+    share = np.tile(np.eye(3), (mesh.n_faces, 1, 1))
+    at_vertex = longest
+    for _ in range(ROUNDS):
+        excess = _excess(done.mesh, at_vertex, known[done.parent])
+        room = MOST - done.mesh.n_vertices
+        if room <= 0 or not (excess > 0).any():
+            break
+        first = np.argsort(-excess, kind="stable")[:room]
+        long = np.zeros(done.mesh.n_edges, dtype=bool)
+        long[first[excess[first] > 0]] = True
+        done = done.then(split_edges(done.mesh, long))
+        share = _shares(mesh, done)
+        logarithm = np.einsum("fkc,fc->fk", share, np.log(longest)[mesh.faces][done.parent])
+        at_vertex = np.empty(done.mesh.n_vertices)
+        at_vertex[done.mesh.faces] = np.exp(logarithm)
+    face, corner = np.repeat(done.parent, 3), done.mesh.faces.reshape(-1)
+    points = done.mesh.vertices.copy()
+    points[corner] = PnTriangles(mesh, sharp).points(face, share.reshape(-1, 3))
+    copy = TriMesh(points, done.mesh.faces)
+    kept: Ints | None = None
+    if creases is not None:
+        kept = copy.edges[np.unique(copy.halfedge_edge[done.carry(sharp, False)])]
+    return StandIn(copy, kept, mesh)
+
+
+def _excess(mesh: TriMesh, longest: Floats, known: Bools) -> Floats:
+    """By what factor edges of known parts are too long for one of their ends, less 1; (ne,)."""
+    theirs = np.zeros(mesh.n_edges, dtype=bool)
+    theirs[mesh.halfedge_edge[np.repeat(known, 3)]] = True
+    factor = lengths_of_edges(mesh) / longest[mesh.edges].min(axis=1)
+    return np.asarray(np.where(theirs, factor - 1.0, 0.0))
+
+
+def _shares(mesh: TriMesh, done: Refinement) -> Floats:
+    """Barycentric coordinates of the corners of new faces in their parents; (m, 3, 3)."""
+    base = mesh.vertices[mesh.faces[done.parent]]
+    one, two = base[:, 1] - base[:, 0], base[:, 2] - base[:, 0]
+    away = done.mesh.vertices[done.mesh.faces] - base[:, :1]
+    a, b, c = (np.einsum("fi,fi->f", x, y) for x, y in ((one, one), (one, two), (two, two)))
+    x, y = (np.einsum("fki,fi->fk", away, side) for side in (one, two))
+    area = a * c - b * b
+    thin = area <= THIN * (a + c) ** 2
+    area = np.where(thin, 1.0, area)[:, None]
+    second = (c[:, None] * x - b[:, None] * y) / area
+    third = (a[:, None] * y - b[:, None] * x) / area
+    share = np.stack([1.0 - second - third, second, third], axis=2)
+    if thin.any():  # some of the many that do there
+        sides = np.linalg.pinv(np.stack([one[thin], two[thin]], axis=2))
+        inner = np.einsum("fji,fki->fkj", sides, away[thin])
+        share[thin] = np.concatenate([1.0 - inner.sum(axis=2, keepdims=True), inner], axis=2)
+    return share
