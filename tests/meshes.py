@@ -150,6 +150,16 @@ def sheet(nx: int = 16, ny: int = 10, turn: float = 0.0, seed: int = 0) -> TriMe
     return TriMesh(points[:, :, [0, 2, 1]].reshape(-1, 3), _lattice(nx + 1, ny + 1))
 
 
+def folded_sheet() -> TriMesh:
+    """A sheet with one fold of 90 degrees across, and many small sharp bumps behind it."""
+    mesh = grid(40, 20, 4.0, 2.0)
+    x, y, _ = mesh.vertices.T
+    bump = 0.08 * np.random.default_rng(0).standard_normal(len(x))
+    bump[(x < 2.3) | (x > 3.9)] = 0.0
+    v = np.stack([np.minimum(x, 2.0) + bump, y, np.maximum(x - 2.0, 0.0)], axis=1)
+    return TriMesh(v, mesh.faces)
+
+
 def open_cylinder(nu: int = 24, nv: int = 8, radius: float = 1.0, height: float = 2.0) -> TriMesh:
     """Tube about z without lids, facing outward; 2 nu nv faces, two boundary loops."""
     u, z = np.meshgrid(_turn(nu), np.linspace(0.0, height, nv + 1), indexing="ij")

@@ -17,10 +17,16 @@ from vhquad.quad.refined_curves import LONGEST, MOST, refine_curves
 from vhquad.quad.remeshing import remesh_predicted
 
 
+def sure(mesh: TriMesh, confidence: float | np.ndarray = 1.0) -> CrossField:
+    """A field on the faces that is so sure of itself."""
+    ones = np.ones(mesh.n_faces)
+    return CrossField("faces", ones, None, confidence * ones)
+
+
 def refined(mesh: TriMesh, quads: float, angle: float | None = 40.0) -> TriMesh | None:
     """Where everything is sure and of one size."""
     length = np.full(mesh.n_vertices, np.sqrt(mesh.area / quads))
-    found = refine_curves(mesh, length, np.ones(mesh.n_faces), angle=angle)
+    found = refine_curves(mesh, length, sure(mesh), angle=angle)
     return None if found is None else found.mesh
 
 
@@ -52,16 +58,16 @@ def test_edges_of_a_ball_are_short_and_it_is_round() -> None:
 def test_only_parts_of_which_the_field_is_sure() -> None:
     mesh = meshes.two_spheres()
     length = np.full(mesh.n_vertices, np.sqrt(mesh.area / (2.0 * mesh.n_faces)))
-    sure = (mesh.face_component == 1).astype(np.float64)
-    assert refine_curves(mesh, length, np.zeros(mesh.n_faces)) is None
-    found = refine_curves(mesh, length, sure)
+    known = (mesh.face_component == 1).astype(np.float64)
+    assert refine_curves(mesh, length, sure(mesh, 0.0)) is None
+    found = refine_curves(mesh, length, sure(mesh, known))
     assert found is not None
     copy = found.mesh
     count, was = np.bincount(copy.face_component), np.bincount(mesh.face_component)
     assert count[0] == was[0]
     assert count[1] > 2 * was[1]
-    sure[np.flatnonzero(sure)[::3]] = 0.0  # two thirds are not enough
-    assert refine_curves(mesh, length, sure) is None
+    known[np.flatnonzero(known)[::3]] = 0.0  # two thirds are not enough
+    assert refine_curves(mesh, length, sure(mesh, known)) is None
 
 
 def test_where_triangles_are_fine_there_is_no_copy() -> None:
@@ -88,7 +94,7 @@ def test_creases_stay() -> None:
     assert copy.area == pytest.approx(mesh.area, rel=1e-12)
     pairs = find_creases(mesh, 40.0)
     length = np.full(mesh.n_vertices, np.sqrt(mesh.area / 1000))
-    found = refine_curves(mesh, length, np.ones(mesh.n_faces), pairs)
+    found = refine_curves(mesh, length, sure(mesh), pairs)
     assert found is not None
     assert found.creases is not None
     assert len(found.creases) > 2 * len(pairs)

@@ -10,12 +10,15 @@ import pytest
 from tests import meshes
 from vhquad import api
 from vhquad.field.cross import CrossField
+from vhquad.field.features import find_creases
+from vhquad.geometry.frames import face_axes, from_3d
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.triangle import TriMesh
 from vhquad.quad import place, stand_in
 from vhquad.quad.pipeline import RemeshSettings
 from vhquad.quad.remeshing import remesh_predicted
 from vhquad.quad.stand_in import StandIn, make_stand_in
+from vhquad.watch import Watch
 
 
 @pytest.fixture(autouse=True)
@@ -188,3 +191,30 @@ def test_what_cannot_be_mapped_on_a_stand_in_is_done_again(
     assert asked == [(False, True), (True, False)]
     assert made.mesh is mesh
     assert made.result.report.stand_in is None
+
+
+@pytest.mark.parametrize("sure", [False, True])
+def test_creases_found_give_way_on_a_stand_in_too(
+    monkeypatch: pytest.MonkeyPatch, sure: bool
+) -> None:
+    mesh = meshes.folded_sheet()
+    monkeypatch.setattr(stand_in, "FEWEST_FACES", 600)
+
+    def field_of(copy: TriMesh, of: TriMesh | None) -> CrossField:
+        assert of is mesh
+        n = copy.n_faces  # across the fold at an angle
+        axes = face_axes(copy)
+        slanted = np.full((n, 3), [0.0, 1.0, 0.5]) + np.array([0.5, 0.0, 0.0])
+        z = from_3d(slanted, axes) ** 4
+        return CrossField("faces", z / np.abs(z), None, np.full(n, float(sure)))
+
+    itself = place.Place(mesh, None, None)
+    settings = RemeshSettings(target_quads=100)
+    chosen = place.choose_place(itself, field_of, settings, True, False, Watch())
+    assert chosen.place.onto is mesh
+    assert chosen.place.creases is not None
+    assert (len(chosen.place.creases) == 0) == sure
+    given = place.Place(mesh, find_creases(mesh), None)
+    chosen = place.choose_place(given, field_of, settings, True, False, Watch())
+    assert chosen.place.creases is not None
+    assert len(chosen.place.creases) > 0

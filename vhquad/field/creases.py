@@ -6,9 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vhquad.field.bridge import bridge_gaps
+from vhquad.field.cross import CrossField
+from vhquad.field.dual import face_angles
 from vhquad.field.features import crease_halfedges, find_creases, sharp_edges
 from vhquad.field.grow import are_mostly_creases, grow_creases, with_steps
 from vhquad.field.prune import prune_branches
+from vhquad.field.refine import lengths_of_edges
+from vhquad.field.sharpness import chain_labels
 from vhquad.mesh.triangle import TriMesh
 
 __all__ = ["LOOSE", "TOGETHER", "creases_for_quads", "without_known"]
@@ -22,7 +26,8 @@ GAP = 0.75
 """Quad edges; creases that end so near others go on to them."""
 LOOSE = 1.5
 """Quad edges; shorter creases that end loose are noise."""
-KNOWN = 0.5  # trust in the field on both sides of an edge from which on it needs no crease
+KNOWN = 0.5  # mean trust in the field beside a chain of creases from which on the field decides
+CROSSED = np.radians(5)  # mean angle between a chain and the nearest arms of the field
 
 
 def creases_for_quads(
@@ -30,7 +35,7 @@ def creases_for_quads(
     degrees: float,
     edge_length: float,
     together: float = TOGETHER,
-    trust: Floats | None = None,
+    field: CrossField | None = None,
 ) -> Ints:
     """Edges that quads shall follow.
 
@@ -43,8 +48,8 @@ def creases_for_quads(
         Of the quads to come, in units of the mesh.
     together : float
         Least total length of a connected piece, in quad edges.
-    trust : (m,) float64, optional
-        In the directions of the field at the faces, see :func:`without_known`. Default: none.
+    field : CrossField, optional
+        On the faces; it may know better, see :func:`without_known`.
 
     Returns
     -------
@@ -53,19 +58,19 @@ def creases_for_quads(
     """
     found = find_creases(mesh, degrees, together * edge_length)
     sharp = sharp_edges(mesh, degrees)
-    if trust is not None:
-        found = without_known(mesh, found, sharp, trust)
+    if field is not None:
+        found = without_known(mesh, found, sharp, field)
     grown = grow_creases(mesh, found, sharp, degrees)
     stepped = with_steps(mesh, grown, sharp, together * edge_length)
     joined = bridge_gaps(mesh, stepped, GAP * edge_length)
     return prune_branches(mesh, joined, LOOSE * edge_length)
 
 
-def without_known(mesh: TriMesh, pairs: Ints, sharp: Ints, trust: Floats) -> Ints:
-    """Creases less those where the field is sure, unless the mesh was designed with creases.
+def without_known(mesh: TriMesh, pairs: Ints, sharp: Ints, field: CrossField) -> Ints:
+    """Creases less those that a sure field crosses, unless the mesh was designed with creases.
 
     A network that is sure of a shape has seen what is sharp there, as the lids of an eye, and knows
-    how edges run about it; to hold them on the sharpest line as well only bends them.
+    how edges run about it: to hold some on the sharpest line as well only bends them.
 
     Parameters
     ----------
@@ -74,11 +79,19 @@ def without_known(mesh: TriMesh, pairs: Ints, sharp: Ints, trust: Floats) -> Int
         Crease edges as vertex pairs, found by angle.
     sharp : (j,) int64
         Sharp edges, as :func:`vhquad.field.features.sharp_edges` finds them.
-    trust : (m,) float64
-        In the field at the faces, in [0, 1].
+    field : CrossField
+        On the faces.
     """
     if len(pairs) == 0 or are_mostly_creases(mesh, pairs, sharp):
         return pairs
     edge = np.unique(mesh.halfedge_edge[crease_halfedges(mesh, pairs)])
-    sure = trust[mesh.edge_halfedges[edge] // 3].mean(axis=1) > KNOWN
-    return mesh.edges[edge[~sure]]
+    beside = mesh.edge_halfedges[edge]
+    off = 4.0 * (face_angles(mesh)[beside] - field.angle[beside // 3])
+    off = np.abs(np.angle(np.exp(1j * off))).mean(axis=1) / 4.0
+    trust = field.trust[beside // 3].mean(axis=1)
+    chain = chain_labels(mesh, mesh.edges[edge])
+    length = lengths_of_edges(mesh)[edge]
+    total = np.bincount(chain, length)
+    crossed = np.bincount(chain, length * off) > CROSSED * total
+    known = np.bincount(chain, length * trust) > KNOWN * total
+    return mesh.edges[edge[~(crossed & known)[chain]]]

@@ -145,8 +145,7 @@ class Component:
         if self.crease_angle is None:
             return np.zeros((0, 2), dtype=np.int64)
         length = float(np.sqrt(self.mesh.area / quads))
-        trust = self.field.trust
-        return creases_for_quads(self.mesh, self.crease_angle, length, together, trust)
+        return creases_for_quads(self.mesh, self.crease_angle, length, together, self.field)
 
     def curving(self, creases: Ints) -> float:
         """How far sizes follow these creases where they are curved.

@@ -128,8 +128,7 @@ def choose_place(
             wanted = place.sizes(on_faces, settings)
             unit = np.sqrt(wanted.quads / stand_in_quads(wanted.quads))
             length = unit * wanted.at_vertices(place.mesh)
-            trust = on_faces.trust
-            refined = refine_curves(place.mesh, length, trust, place.creases, settings.crease)
+            refined = refine_curves(place.mesh, length, on_faces, place.creases, settings.crease)
         if refined is not None:
             place = place.of(refined, place.mesh)
             with watch("field"):
@@ -143,5 +142,5 @@ def _less_known_creases(place: Place, cross: CrossField, settings: RemeshSetting
     if place.creases is None or settings.crease is None:
         return place
     sharp = sharp_edges(place.mesh, settings.crease)
-    trust = to_faces(place.mesh, cross).trust
-    return replace(place, creases=without_known(place.mesh, place.creases, sharp, trust))
+    on_faces = to_faces(place.mesh, cross)
+    return replace(place, creases=without_known(place.mesh, place.creases, sharp, on_faces))

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vhquad.field.creases import creases_for_quads
+from vhquad.field.cross import CrossField
 from vhquad.field.features import crease_halfedges
 from vhquad.field.refine import Refinement, lengths_of_edges, no_refinement, split_edges
 from vhquad.mesh.pn_triangles import PnTriangles
@@ -36,7 +37,7 @@ THIN = 1e-12  # square of the area, by the length to the fourth: a triangle that
 def refine_curves(
     mesh: TriMesh,
     length: Floats,
-    trust: Floats,
+    field: CrossField,
     creases: Ints | None = None,
     angle: float | None = None,
 ) -> StandIn | None:
@@ -48,9 +49,8 @@ def refine_curves(
         Sound, any components and borders.
     length : (n,) float64
         Wanted length of quad edges near each vertex.
-    trust : (m,) float64
-        In the directions of the field at the faces. Parts of which the field is not sure are left
-        alone.
+    field : CrossField
+        On the faces. Parts of which it is not sure are left alone.
     creases : (k, 2) int64, optional
         Edges that quads must follow, in place of those sharper than the angle. They stay straight,
         as borders do.
@@ -64,7 +64,7 @@ def refine_curves(
     """
     quads = mesh.face_areas / np.exp(2.0 * np.log(length)[mesh.faces].mean(axis=1))
     longest = LONGEST * length
-    sure = np.bincount(mesh.face_component, quads * (trust > SURE))
+    sure = np.bincount(mesh.face_component, quads * (field.trust > SURE))
     known = (sure > KNOWN * np.bincount(mesh.face_component, quads))[mesh.face_component]
     long = _excess(mesh, longest, known) > 0
     coarse = long[mesh.halfedge_edge].reshape(-1, 3).any(axis=1)
@@ -73,7 +73,7 @@ def refine_curves(
     lines = creases
     if lines is None and angle is not None:
         edge = float(np.sqrt(mesh.area / quads.sum()))
-        lines = creases_for_quads(mesh, angle, edge, trust=trust)
+        lines = creases_for_quads(mesh, angle, edge, field=field)
     sharp = crease_halfedges(mesh, lines)
     done = no_refinement(mesh)
     share = np.tile(np.eye(3), (mesh.n_faces, 1, 1))
