@@ -1,6 +1,6 @@
 """A prepared dataset on disk: an index and one archive a sample.
 
-Layout (version 2)::
+Layout (version 4)::
 
     dataset/
       index.json          what follows, as JSON
@@ -8,7 +8,7 @@ Layout (version 2)::
 
 ``index.json``::
 
-    {"format": "vhquad-dataset", "version": 2,
+    {"format": "vhquad-dataset", "version": 4,
      "features": "local", "turned": true, "k": 128, "in_channels": 48, "in_lines": 6, "order": 4,
      "samples": [{"name": "head_0001.t0", "shape": "head_0001", "source": "head_0001.obj",
                   "split": "train", "truth": true, "vertices": 3066, "leak": 0.03,
@@ -59,7 +59,7 @@ ARRAYS = (
     "z", "size", "coherence",
 )  # fmt: skip
 PER_VERTEX = frozenset(ARRAYS) - {"faces", "eigenvalues"}
-FORMAT, VERSION = "vhquad-dataset", 3  # since 3, truths are means over cells
+FORMAT, VERSION = "vhquad-dataset", 4  # since 4, Laplacians are definite at borders
 Split = Literal["train", "val", "test"]
 
 
