@@ -27,8 +27,8 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 LONGEST = 0.8  # edge, in quad edges
-WORTH_FROM = 0.05  # of the quads on triangles with longer ones
-MOST = 15_000  # vertices: the network sees no more of a component
+WORTH_FROM = 0.5  # of the quads on triangles with longer ones
+MOST = 15_000  # vertices in all: of a component the network sees no more
 SURE, KNOWN = 0.5, 0.8  # trust in the field of a face; share of a part that has as much
 ROUNDS = 100
 THIN = 1e-12  # square of the area, by the length to the fourth: a triangle that is a line
