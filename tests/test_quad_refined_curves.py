@@ -56,7 +56,9 @@ def test_edges_of_a_ball_are_short_and_it_is_round() -> None:
 
 
 def test_only_parts_of_which_the_field_is_sure() -> None:
-    mesh = meshes.two_spheres()
+    mesh = meshes.merge(
+        meshes.icosphere(2), meshes.moved(meshes.icosphere(2), (5.0, 0.0, 0.0), 2.0)
+    )
     length = np.full(mesh.n_vertices, np.sqrt(mesh.area / (2.0 * mesh.n_faces)))
     known = (mesh.face_component == 1).astype(np.float64)
     assert refine_curves(mesh, length, sure(mesh, 0.0)) is None
