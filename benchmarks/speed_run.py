@@ -23,7 +23,9 @@ from vhquad.cache import default_cache_dir
 STEPS = {
     "read": ["vhquad.mesh.load.read_polygons", "vhquad.api.load_kept"],
     "repair": ["vhquad.mesh.load.repair"],
-    "stand-in": ["vhquad.quad.remeshing.make_stand_in"],
+    "stand-in": [
+        f"vhquad.quad.place.{name}" for name in ("make_stand_in", "refine_planes", "refine_curves")
+    ],
     "proxy": ["vhquad.learn.proxy.make_proxy", "vhquad.learn.proxy.carry_back"],
     "operators": ["vhquad.geometry.operators.build_operators"],
     "eigenpairs": ["vhquad.geometry.operators.smallest_eigenpairs"],
