@@ -13,7 +13,6 @@ from vhquad.field.cross import CrossField
 from vhquad.field.features import sharp_edges
 from vhquad.field.transport import to_faces
 from vhquad.mesh.triangle import TriMesh
-from vhquad.quad.counts import stand_in_quads
 from vhquad.quad.pipeline import RemeshSettings
 from vhquad.quad.refined_curves import refine_curves
 from vhquad.quad.refined_planes import refine_planes
@@ -126,8 +125,7 @@ def choose_place(
         with watch("stand-in"):
             on_faces = to_faces(place.mesh, cross)
             wanted = place.sizes(on_faces, settings)
-            unit = np.sqrt(wanted.quads / stand_in_quads(wanted.quads))
-            length = unit * wanted.at_vertices(place.mesh)
+            length = wanted.at_vertices(place.mesh)
             refined = refine_curves(place.mesh, length, on_faces, place.creases, settings.crease)
         if refined is not None:
             place = place.of(refined, place.mesh)

@@ -26,11 +26,12 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-LONGEST = 0.8  # edge, in quad edges
+LONGEST = 1.0  # edge of triangles that are fine enough, in quad edges
 WORTH_FROM = 0.5  # of the quads on triangles with longer ones
-MOST = 15_000  # vertices in all: of a component the network sees no more
+LEAST, MOST = 5_000, 12_000  # vertices: of the mesh, below which there is little detail; of a copy
+FIRST = 0.7  # of the largest factor by which an edge is too long: others wait
 SURE, KNOWN = 0.5, 0.8  # trust in the field of a face; share of a part that has as much
-ROUNDS = 100
+ROUNDS = 200
 THIN = 1e-12  # square of the area, by the length to the fourth: a triangle that is a line
 
 
@@ -41,7 +42,9 @@ def refine_curves(
     creases: Ints | None = None,
     angle: float | None = None,
 ) -> StandIn | None:
-    """A copy of a mesh with no edge that is much longer than the quads there are to be.
+    """A copy of a mesh with edges short for the quads there are to be, if its own are not.
+
+    The copy is as fine as it can be, whatever the number of quads, so that it serves other numbers.
 
     Parameters
     ----------
@@ -62,13 +65,13 @@ def refine_curves(
     StandIn or None
         None where triangles are fine enough.
     """
+    if not LEAST <= mesh.n_vertices < MOST:
+        return None
     quads = mesh.face_areas / np.exp(2.0 * np.log(length)[mesh.faces].mean(axis=1))
-    longest = LONGEST * length
     sure = np.bincount(mesh.face_component, quads * (field.trust > SURE))
     known = (sure > KNOWN * np.bincount(mesh.face_component, quads))[mesh.face_component]
-    long = _excess(mesh, longest, known) > 0
-    coarse = long[mesh.halfedge_edge].reshape(-1, 3).any(axis=1)
-    if mesh.n_vertices > MOST or quads[coarse].sum() < WORTH_FROM * quads.sum():
+    coarse = (_factors(mesh, length, known) > LONGEST)[mesh.halfedge_edge].reshape(-1, 3)
+    if quads[coarse.any(axis=1)].sum() < WORTH_FROM * quads.sum():
         return None
     lines = creases
     if lines is None and angle is not None:
@@ -77,18 +80,18 @@ def refine_curves(
     sharp = crease_halfedges(mesh, lines)
     done = no_refinement(mesh)
     share = np.tile(np.eye(3), (mesh.n_faces, 1, 1))
-    at_vertex = longest
+    at_vertex = length
     for _ in range(ROUNDS):
-        excess = _excess(done.mesh, at_vertex, known[done.parent])
         room = MOST - done.mesh.n_vertices
-        if room <= 0 or not (excess > 0).any():
+        if room <= 0:
             break
-        first = np.argsort(-excess, kind="stable")[:room]
+        factor = _factors(done.mesh, at_vertex, known[done.parent])
+        first = np.argsort(-factor, kind="stable")[:room]
         long = np.zeros(done.mesh.n_edges, dtype=bool)
-        long[first[excess[first] > 0]] = True
-        done = done.then(split_edges(done.mesh, long))
+        long[first[factor[first] > FIRST * factor.max()]] = True
+        done = done.then(split_edges(done.mesh, long, factor))
         share = _shares(mesh, done)
-        logarithm = np.einsum("fkc,fc->fk", share, np.log(longest)[mesh.faces][done.parent])
+        logarithm = np.einsum("fkc,fc->fk", share, np.log(length)[mesh.faces][done.parent])
         at_vertex = np.empty(done.mesh.n_vertices)
         at_vertex[done.mesh.faces] = np.exp(logarithm)
     face, corner = np.repeat(done.parent, 3), done.mesh.faces.reshape(-1)
@@ -101,12 +104,12 @@ def refine_curves(
     return StandIn(copy, kept, mesh)
 
 
-def _excess(mesh: TriMesh, longest: Floats, known: Bools) -> Floats:
-    """By what factor edges of known parts are too long for one of their ends, less 1; (ne,)."""
+def _factors(mesh: TriMesh, length: Floats, known: Bools) -> Floats:
+    """Length of edges of known parts over the least at their ends that is wanted, else 0; (ne,)."""
     theirs = np.zeros(mesh.n_edges, dtype=bool)
     theirs[mesh.halfedge_edge[np.repeat(known, 3)]] = True
-    factor = lengths_of_edges(mesh) / longest[mesh.edges].min(axis=1)
-    return np.asarray(np.where(theirs, factor - 1.0, 0.0))
+    factor = lengths_of_edges(mesh) / length[mesh.edges].min(axis=1)
+    return np.asarray(np.where(theirs, factor, 0.0))
 
 
 def _shares(mesh: TriMesh, done: Refinement) -> Floats:
