@@ -12,9 +12,20 @@ from vhquad.field.refine import lengths_of_edges
 from vhquad.geometry.frames import from_3d, vertex_axes
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.triangle import TriMesh
+from vhquad.quad import refined_curves
 from vhquad.quad.pipeline import RemeshSettings
-from vhquad.quad.refined_curves import LONGEST, MOST, refine_curves
+from vhquad.quad.refined_curves import LEAST, MOST, refine_curves
 from vhquad.quad.remeshing import remesh_predicted
+
+
+@pytest.fixture(autouse=True)
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Meshes of these tests count as fine enough to have detail."""
+    monkeypatch.setattr(refined_curves, "LEAST", 3)
+
+
+def most(monkeypatch: pytest.MonkeyPatch, n_vertices: int) -> None:
+    monkeypatch.setattr(refined_curves, "MOST", n_vertices)
 
 
 def sure(mesh: TriMesh, confidence: float | np.ndarray = 1.0) -> CrossField:
@@ -25,14 +36,15 @@ def sure(mesh: TriMesh, confidence: float | np.ndarray = 1.0) -> CrossField:
 
 def refined(mesh: TriMesh, quads: float, angle: float | None = 40.0) -> TriMesh | None:
     """Where everything is sure and of one size."""
-    length = np.full(mesh.n_vertices, np.sqrt(mesh.area / quads))
-    found = refine_curves(mesh, length, sure(mesh), angle=angle)
+    scale = float(np.sqrt(mesh.area / quads))
+    found = refine_curves(mesh, np.ones(mesh.n_vertices), scale, sure(mesh), angle=angle)
     return None if found is None else found.mesh
 
 
 @pytest.mark.parametrize("case", meshes.EVERY, ids=str)
-def test_topology_and_vertices_stay(case: meshes.Case) -> None:
+def test_topology_and_vertices_stay(case: meshes.Case, monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = case.mesh
+    most(monkeypatch, 3 * mesh.n_vertices)
     copy = refined(mesh, 2.0 * mesh.n_faces)
     assert copy is not None
     assert copy.n_components == mesh.n_components
@@ -43,16 +55,38 @@ def test_topology_and_vertices_stay(case: meshes.Case) -> None:
     np.testing.assert_allclose(copy.vertices[: mesh.n_vertices], mesh.vertices, atol=1e-12)
 
 
-def test_edges_of_a_ball_are_short_and_it_is_round() -> None:
+def test_a_ball_is_round_and_its_triangles_alike(monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = meshes.icosphere(2)
+    most(monkeypatch, 2562)  # as the sphere of two more subdivisions
     copy = refined(mesh, 2000)
     assert copy is not None
-    longest = LONGEST * np.sqrt(mesh.area / 2000)
-    assert 0.5 * longest < lengths_of_edges(copy).max() < 1.1 * longest
-    # Flat triangles lack 3 % of the area, these a twentieth of that.
+    longest, mean = lengths_of_edges(copy).max(), lengths_of_edges(meshes.icosphere(4)).mean()
+    assert mean < longest < 2.0 * mean  # a round of bisections apart, at most
+    # Flat triangles lack 3 % of the area, these a tenth of that.
     assert abs(copy.area - 4 * np.pi) < 0.1 * abs(mesh.area - 4 * np.pi)
     facing = np.einsum("fi,fi->f", copy.face_normals, copy.vertices[copy.faces].mean(axis=1))
     assert facing.min() > 0.95
+
+
+def test_triangles_are_small_where_quads_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh = meshes.icosphere(3)
+    most(monkeypatch, 4000)
+    z = mesh.vertices[:, 2]
+    length = np.where(z > 0.0, 0.02, 0.08)
+    found = refine_curves(mesh, length, 1.0, sure(mesh))
+    assert found is not None
+    place = found.mesh.vertices[found.mesh.edges].mean(axis=1)[:, 2]
+    edges = lengths_of_edges(found.mesh)
+    assert edges[place > 0.2].mean() < 0.6 * edges[place < -0.2].mean()
+
+
+def test_one_copy_serves_all_numbers_of_quads() -> None:
+    mesh = meshes.icosphere(3)
+    one, two = refined(mesh, 1000), refined(mesh, 4000)
+    assert one is not None
+    assert two is not None
+    np.testing.assert_array_equal(one.vertices, two.vertices)
+    np.testing.assert_array_equal(one.faces, two.faces)
 
 
 def test_only_parts_of_which_the_field_is_sure() -> None:
@@ -61,42 +95,37 @@ def test_only_parts_of_which_the_field_is_sure() -> None:
     )
     length = np.full(mesh.n_vertices, np.sqrt(mesh.area / (2.0 * mesh.n_faces)))
     known = (mesh.face_component == 1).astype(np.float64)
-    assert refine_curves(mesh, length, sure(mesh, 0.0)) is None
-    found = refine_curves(mesh, length, sure(mesh, known))
+    assert refine_curves(mesh, length, 1.0, sure(mesh, 0.0)) is None
+    found = refine_curves(mesh, length, 1.0, sure(mesh, known))
     assert found is not None
     copy = found.mesh
+    assert copy.n_vertices == MOST
     count, was = np.bincount(copy.face_component), np.bincount(mesh.face_component)
     assert count[0] == was[0]
     assert count[1] > 2 * was[1]
     known[np.flatnonzero(known)[::3]] = 0.0  # two thirds are not enough
-    assert refine_curves(mesh, length, sure(mesh, known)) is None
+    assert refine_curves(mesh, length, 1.0, sure(mesh, known)) is None
 
 
-def test_where_triangles_are_fine_there_is_no_copy() -> None:
-    assert refined(meshes.icosphere(4), 500) is None
+def test_where_it_is_not_worth_while_there_is_no_copy(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert refined(meshes.icosphere(4), 500) is None  # triangles are fine
+    assert refined(meshes.icosphere(3), 50_000) is not None
+    assert refined(meshes.icosphere(6), 500_000) is None  # as many vertices as a copy may have
+    monkeypatch.setattr(refined_curves, "LEAST", LEAST)
+    assert refined(meshes.icosphere(3), 50_000) is None  # no detail
 
 
-def test_no_more_vertices_than_the_network_sees() -> None:
-    copy = refined(meshes.icosphere(3), 50_000)
-    assert copy is not None
-    assert copy.n_vertices == MOST
-    fine = meshes.icosphere(5)
-    assert len(fine.vertices) < MOST
-    copy = refined(fine, 50_000)
-    assert copy is not None
-    assert copy.n_vertices == MOST
-
-
-def test_creases_stay() -> None:
+def test_creases_stay(monkeypatch: pytest.MonkeyPatch) -> None:
     """A cube with sharp edges stays one; given edges are carried, all of their length."""
     mesh = meshes.cube(3)
+    most(monkeypatch, 1000)
     copy = refined(mesh, 1000)
     assert copy is not None
     assert np.abs(np.abs(copy.vertices).max(axis=1) - 0.5).max() < 1e-12
     assert copy.area == pytest.approx(mesh.area, rel=1e-12)
     pairs = find_creases(mesh, 40.0)
     length = np.full(mesh.n_vertices, np.sqrt(mesh.area / 1000))
-    found = refine_curves(mesh, length, sure(mesh), pairs)
+    found = refine_curves(mesh, length, 1.0, sure(mesh), pairs)
     assert found is not None
     assert found.creases is not None
     assert len(found.creases) > 2 * len(pairs)
@@ -104,7 +133,8 @@ def test_creases_stay() -> None:
     assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(12.0)
 
 
-def test_a_triangle_that_is_a_line() -> None:
+def test_a_triangle_that_is_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    most(monkeypatch, 500)
     flat = meshes.grid(4, 3)
     ends = [[0.0, 0.0, 0.0], [0.25, 0.0, 0.0]]
     first, second = (int(np.abs(flat.vertices - end).sum(axis=1).argmin()) for end in ends)

@@ -37,7 +37,8 @@ THIN = 1e-12  # square of the area, by the length to the fourth: a triangle that
 
 def refine_curves(
     mesh: TriMesh,
-    length: Floats,
+    size: Floats,
+    scale: float,
     field: CrossField,
     creases: Ints | None = None,
     angle: float | None = None,
@@ -50,8 +51,10 @@ def refine_curves(
     ----------
     mesh : TriMesh
         Sound, any components and borders.
-    length : (n,) float64
-        Wanted length of quad edges near each vertex.
+    size : (n,) float64
+        Wanted length of quad edges near each vertex, up to the scale.
+    scale : float
+        It says whether there is a copy, not what it is like.
     field : CrossField
         On the faces. Parts of which it is not sure are left alone.
     creases : (k, 2) int64, optional
@@ -67,10 +70,10 @@ def refine_curves(
     """
     if not LEAST <= mesh.n_vertices < MOST:
         return None
-    quads = mesh.face_areas / np.exp(2.0 * np.log(length)[mesh.faces].mean(axis=1))
+    quads = mesh.face_areas / np.exp(2.0 * np.log(scale * size)[mesh.faces].mean(axis=1))
     sure = np.bincount(mesh.face_component, quads * (field.trust > SURE))
     known = (sure > KNOWN * np.bincount(mesh.face_component, quads))[mesh.face_component]
-    coarse = (_factors(mesh, length, known) > LONGEST)[mesh.halfedge_edge].reshape(-1, 3)
+    coarse = (_factors(mesh, size, known) > LONGEST * scale)[mesh.halfedge_edge].reshape(-1, 3)
     if quads[coarse.any(axis=1)].sum() < WORTH_FROM * quads.sum():
         return None
     lines = creases
@@ -80,7 +83,7 @@ def refine_curves(
     sharp = crease_halfedges(mesh, lines)
     done = no_refinement(mesh)
     share = np.tile(np.eye(3), (mesh.n_faces, 1, 1))
-    at_vertex = length
+    at_vertex = size
     for _ in range(ROUNDS):
         room = MOST - done.mesh.n_vertices
         if room <= 0:
@@ -91,7 +94,7 @@ def refine_curves(
         long[first[factor[first] > FIRST * factor.max()]] = True
         done = done.then(split_edges(done.mesh, long, factor))
         share = _shares(mesh, done)
-        logarithm = np.einsum("fkc,fc->fk", share, np.log(length)[mesh.faces][done.parent])
+        logarithm = np.einsum("fkc,fc->fk", share, np.log(size)[mesh.faces][done.parent])
         at_vertex = np.empty(done.mesh.n_vertices)
         at_vertex[done.mesh.faces] = np.exp(logarithm)
     face, corner = np.repeat(done.parent, 3), done.mesh.faces.reshape(-1)
@@ -104,11 +107,11 @@ def refine_curves(
     return StandIn(copy, kept, mesh)
 
 
-def _factors(mesh: TriMesh, length: Floats, known: Bools) -> Floats:
+def _factors(mesh: TriMesh, size: Floats, known: Bools) -> Floats:
     """Length of edges of known parts over the least at their ends that is wanted, else 0; (ne,)."""
     theirs = np.zeros(mesh.n_edges, dtype=bool)
     theirs[mesh.halfedge_edge[np.repeat(known, 3)]] = True
-    factor = lengths_of_edges(mesh) / length[mesh.edges].min(axis=1)
+    factor = lengths_of_edges(mesh) / size[mesh.edges].min(axis=1)
     return np.asarray(np.where(theirs, factor, 0.0))
 
 

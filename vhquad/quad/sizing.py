@@ -43,9 +43,9 @@ class WantedSizes(NamedTuple):
         """The edge lengths themselves; (m,)."""
         return self.relative * self.scale
 
-    def at_vertices(self, mesh: TriMesh) -> Floats:
-        """The mean of the lengths around each vertex of the mesh they are for; (n,)."""
-        corner, each = mesh.faces.reshape(-1), np.repeat(np.log(self.lengths), 3)
+    def relative_at_vertices(self, mesh: TriMesh) -> Floats:
+        """The mean of the relative ones around each vertex of the mesh they are for; (n,)."""
+        corner, each = mesh.faces.reshape(-1), np.repeat(np.log(self.relative), 3)
         count = np.bincount(corner, minlength=mesh.n_vertices)
         return np.exp(np.bincount(corner, each, mesh.n_vertices) / np.maximum(count, 1))
 
