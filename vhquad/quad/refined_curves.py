@@ -28,7 +28,8 @@ Bools = NDArray[np.bool_]
 
 LONGEST = 1.0  # edge of triangles that are fine enough, in quad edges
 WORTH_FROM = 0.5  # of the quads on triangles with longer ones
-LEAST, MOST = 5_000, 12_000  # vertices: of the mesh, below which there is little detail; of a copy
+LEAST, LARGEST = 5_000, 9_000  # vertices of a mesh: fewer have little detail, more are fine enough
+MOST = 12_000  # vertices of a copy
 FIRST = 0.7  # of the largest factor by which an edge is too long: others wait
 SURE, KNOWN = 0.5, 0.8  # trust in the field of a face; share of a part that has as much
 ROUNDS = 200
@@ -68,7 +69,7 @@ def refine_curves(
     StandIn or None
         None where triangles are fine enough.
     """
-    if not LEAST <= mesh.n_vertices < MOST:
+    if not LEAST <= mesh.n_vertices <= LARGEST:
         return None
     quads = mesh.face_areas / np.exp(2.0 * np.log(scale * size)[mesh.faces].mean(axis=1))
     sure = np.bincount(mesh.face_component, quads * (field.trust > SURE))
