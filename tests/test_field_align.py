@@ -70,6 +70,7 @@ def test_guarantees_hold_whatever_the_settings(
     aligned = align_field(mesh, field, creases, settings)
     check_aligned(mesh, aligned)
     np.testing.assert_array_equal(aligned.size, size[aligned.parent_face])
+    np.testing.assert_array_equal(aligned.trust, field.trust[aligned.parent_face])
 
 
 @pytest.mark.parametrize(

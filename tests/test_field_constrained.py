@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.meshes import grid
 from vhquad.field.constrained import pose
-from vhquad.field.cross import CrossField, trust_in
+from vhquad.field.cross import CrossField
 from vhquad.field.refine import no_refinement
 from vhquad.geometry.frames import face_axes, from_3d
 
@@ -27,15 +29,25 @@ def left_of_a_wave(smoothing: float, confidence: float | None) -> float:
     return float((left * wave).sum() / (wave**2).sum())
 
 
-@pytest.mark.parametrize(("confidence", "trust"), [(0.5, 0.0), (0.9, 0.0), (0.95, 0.5), (1.0, 1.0)])
+TRUST = [(0.5, 0.0), (0.9, 0.0), (0.95, 0.5), (1.0, 1.0)]  # of a confidence
+
+
+def test_a_field_is_sure_if_it_says_so() -> None:
+    confidence, trust = np.array(TRUST).T
+    field = CrossField("faces", np.ones(len(TRUST)), confidence=confidence)
+    np.testing.assert_allclose(field.trust, trust)
+    assert not replace(field, confidence=None).trust.any()
+
+
+@pytest.mark.parametrize(("confidence", "trust"), TRUST)
 @pytest.mark.parametrize("smoothing", [0.25, 1.0])
 def test_a_wave_is_damped_by_its_length(smoothing: float, confidence: float, trust: float) -> None:
     """``w / (w + k^2)`` is left of a wave of number k. The weight w is the confidence over the
-    squared length of detail, which is half as much where the field is sure."""
-    assert trust_in(np.array([confidence])) == pytest.approx(trust)
+    squared length of detail, which is a tenth where the field is sure."""
     plain, left = (left_of_a_wave(smoothing, value) for value in (None, confidence))
     # On these triangles the wave is no exact eigenvector, and its energy 9 % above the plane's.
     weight = 1.0 / (0.2 * smoothing) ** 2
     assert plain == pytest.approx(weight / (weight + (2 * np.pi) ** 2), rel=0.1)
-    odds = left / (1 - left) / (plain / (1 - plain))
-    assert odds == pytest.approx(confidence * 4.0**trust, rel=0.02)
+    # All else is exact: it is as if so much shorter details had been asked for.
+    shorter = smoothing * 0.1**trust / np.sqrt(confidence)
+    assert 1.0 - left == pytest.approx(1.0 - left_of_a_wave(shorter, None), rel=1e-9)

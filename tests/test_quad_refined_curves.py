@@ -16,6 +16,7 @@ from vhquad.quad import refined_curves
 from vhquad.quad.pipeline import RemeshSettings
 from vhquad.quad.refined_curves import LEAST, MOST, refine_curves
 from vhquad.quad.remeshing import remesh_predicted
+from vhquad.quad.sizing import WantedSizes
 
 
 @pytest.fixture(autouse=True)
@@ -34,10 +35,14 @@ def sure(mesh: TriMesh, confidence: float | np.ndarray = 1.0) -> CrossField:
     return CrossField("faces", ones, None, confidence * ones)
 
 
+def even(mesh: TriMesh, quads: float) -> WantedSizes:
+    """So many quads, all of one size."""
+    return WantedSizes(np.ones(mesh.n_faces), float(np.sqrt(mesh.area / quads)), round(quads))
+
+
 def refined(mesh: TriMesh, quads: float, angle: float | None = 40.0) -> TriMesh | None:
     """Where everything is sure and of one size."""
-    scale = float(np.sqrt(mesh.area / quads))
-    found = refine_curves(mesh, np.ones(mesh.n_vertices), scale, sure(mesh), angle=angle)
+    found = refine_curves(mesh, even(mesh, quads), sure(mesh), angle=angle)
     return None if found is None else found.mesh
 
 
@@ -71,9 +76,10 @@ def test_a_ball_is_round_and_its_triangles_alike(monkeypatch: pytest.MonkeyPatch
 def test_triangles_are_small_where_quads_are(monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = meshes.icosphere(3)
     most(monkeypatch, 4000)
-    z = mesh.vertices[:, 2]
+    z = mesh.vertices[mesh.faces].mean(axis=1)[:, 2]
     length = np.where(z > 0.0, 0.02, 0.08)
-    found = refine_curves(mesh, length, 1.0, sure(mesh))
+    wanted = WantedSizes(length, 1.0, round((mesh.face_areas / length**2).sum()))
+    found = refine_curves(mesh, wanted, sure(mesh))
     assert found is not None
     place = found.mesh.vertices[found.mesh.edges].mean(axis=1)[:, 2]
     edges = lengths_of_edges(found.mesh)
@@ -93,10 +99,10 @@ def test_only_parts_of_which_the_field_is_sure() -> None:
     mesh = meshes.merge(
         meshes.icosphere(2), meshes.moved(meshes.icosphere(2), (5.0, 0.0, 0.0), 2.0)
     )
-    length = np.full(mesh.n_vertices, np.sqrt(mesh.area / (2.0 * mesh.n_faces)))
+    wanted = even(mesh, 2.0 * mesh.n_faces)
     known = (mesh.face_component == 1).astype(np.float64)
-    assert refine_curves(mesh, length, 1.0, sure(mesh, 0.0)) is None
-    found = refine_curves(mesh, length, 1.0, sure(mesh, known))
+    assert refine_curves(mesh, wanted, sure(mesh, 0.0)) is None
+    found = refine_curves(mesh, wanted, sure(mesh, known))
     assert found is not None
     copy = found.mesh
     assert copy.n_vertices == MOST
@@ -104,7 +110,7 @@ def test_only_parts_of_which_the_field_is_sure() -> None:
     assert count[0] == was[0]
     assert count[1] > 2 * was[1]
     known[np.flatnonzero(known)[::3]] = 0.0  # two thirds are not enough
-    assert refine_curves(mesh, length, 1.0, sure(mesh, known)) is None
+    assert refine_curves(mesh, wanted, sure(mesh, known)) is None
 
 
 def test_where_it_is_not_worth_while_there_is_no_copy(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -124,8 +130,7 @@ def test_creases_stay(monkeypatch: pytest.MonkeyPatch) -> None:
     assert np.abs(np.abs(copy.vertices).max(axis=1) - 0.5).max() < 1e-12
     assert copy.area == pytest.approx(mesh.area, rel=1e-12)
     pairs = find_creases(mesh, 40.0)
-    length = np.full(mesh.n_vertices, np.sqrt(mesh.area / 1000))
-    found = refine_curves(mesh, length, 1.0, sure(mesh), pairs)
+    found = refine_curves(mesh, even(mesh, 1000), sure(mesh), pairs)
     assert found is not None
     assert found.creases is not None
     assert len(found.creases) > 2 * len(pairs)

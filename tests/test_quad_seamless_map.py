@@ -118,14 +118,6 @@ def test_sizes_count_less_where_the_field_is_sure() -> None:
     np.testing.assert_allclose(sure, [0.01, 0.0125, 0.1, 1.0])
     # 3: the geometric mean between, and sizes count again where the surface turns much.
     np.testing.assert_allclose(size_weights(turn, np.full(4, 0.5)), np.sqrt(doubted * sure))
-    # 4: half a confidence earns no trust, nor does none at all; full confidence earns it all.
-    s = stages("blob")
-    size = np.full(s.aligned.mesh.n_faces, s.edge)
-    low = replace(s.aligned, size=size, confidence=np.zeros(len(size)))
-    assert low.trust.max() == 0.0
-    assert replace(low, confidence=np.full(len(size), 0.5)).trust.max() == 0.0
-    assert replace(low, confidence=None).trust.max() == 0.0
-    assert replace(low, confidence=np.ones(len(size))).trust.min() == 1.0
 
 
 def test_motion_and_scale_change_nothing(rng: np.random.Generator) -> None:

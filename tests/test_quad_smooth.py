@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -302,6 +303,16 @@ def test_edges_off_a_direction_cost_their_share_across() -> None:
     energy, gradient = misalignment(v, q, directions(n, np.zeros_like(first)), size)
     assert energy == 0.0
     assert not gradient.any()
+    # By its weight, and to the bit where that is 1.
+    plain = misalignment(v, q, directions(n, first + 0.1), size)[0]
+    assert misalignment(v, q, directions(n, first + 0.1, np.ones(len(q))), size)[0] == plain
+    weight = np.arange(float(len(q)))
+    each = [
+        misalignment(v, q[[i]], directions(n[[i]], first[[i]] + 0.1), size[[i]])[0]
+        for i in range(len(q))
+    ]
+    total = misalignment(v, q, directions(n, first + 0.1, weight), size)[0]
+    assert total == pytest.approx(weight @ each)
 
 
 def test_gradient_of_the_misalignment(rng: np.random.Generator) -> None:
@@ -310,7 +321,7 @@ def test_gradient_of_the_misalignment(rng: np.random.Generator) -> None:
     n, size = quad_normals(x, q), rng.uniform(0.5, 1.0, len(q))
     along = rng.normal(size=(len(q), 3))
     along /= np.linalg.norm(along, axis=1, keepdims=True)
-    across = directions(n, along)
+    across = directions(n, along, rng.uniform(1.0, 2.0, len(q)))
     _, gradient = misalignment(x, q, across, size)
     move, h = rng.normal(size=v.shape), 1e-5
     ahead = misalignment(x + h * move, q, across, size)[0]
@@ -335,6 +346,8 @@ def test_a_guided_polish_keeps_to_the_field(rng: np.random.Generator) -> None:
     free = smooth_quads(quads.vertices, quads.quads, surface)
     guided = smooth_quads(quads.vertices, quads.quads, surface, guide=guide)
     assert off(guided) < 0.8 * off(free)
+    sure = FieldGuide(replace(s.aligned, trust=np.ones(mesh.n_faces)))
+    assert off(smooth_quads(quads.vertices, quads.quads, surface, guide=sure)) < off(guided)
     assert (corner_jacobians(guided, quads.quads, quad_normals(guided, quads.quads)) > 0).all()
 
 

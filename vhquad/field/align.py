@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from vhquad.errors import ConfigError, FieldError, MeshError
 from vhquad.field.cancel import absorb_at_features, cancel_pairs, cure_low_sectors, low_sectors
 from vhquad.field.constrained import pose
-from vhquad.field.cross import CrossField, trust_in
+from vhquad.field.cross import CrossField
 from vhquad.field.features import crease_halfedges, hopeless_creases
 from vhquad.field.matching import MatchedField
 from vhquad.field.prune import prune_branches
@@ -48,7 +48,7 @@ class AlignSettings:
         the field as they are, or what makes 2,000 quads.
     smoothing : float
         Details of the field smaller than this many edge lengths are smoothed away, where it is
-        sure those below half of that.
+        sure those below a tenth of that.
     cancel : float
         Opposite singularities closer than this many edge lengths are cancelled, and those as close
         to a boundary or crease move on to it; 0 changes none.
@@ -123,8 +123,8 @@ class AlignedField:
         from the face's halfedge 0, radians.
     size : (m,) float64 or None
         Wanted quad edge length.
-    confidence : (m,) float64 or None
-        That of the field, in [0, 1]; None means 1 everywhere.
+    trust : (m,) float64
+        That in the field, see :attr:`vhquad.field.cross.CrossField.trust`.
     feature : (3m,) bool
         Halfedges on a boundary or crease (both halfedges of a crease).
     axis : (3m,) int64
@@ -147,7 +147,7 @@ class AlignedField:
     parent_face: Ints
     angle: Floats
     size: Floats | None
-    confidence: Floats | None
+    trust: Floats
     feature: Bools
     axis: Ints
     rotation: Ints
@@ -156,16 +156,6 @@ class AlignedField:
     sector_vertex: Ints
     sector_is_feature: Bools
     report: AlignReport
-
-    @property
-    def trust(self) -> Floats:
-        """How far directions go before even sizes, in [0, 1]; (m,).
-
-        A field that does not say how sure it is earns none.
-        """
-        if self.confidence is None:
-            return np.zeros(self.mesh.n_faces)
-        return trust_in(self.confidence)
 
 
 def align_field(
@@ -314,7 +304,7 @@ def _pack(
         parent_face=refinement.parent,
         angle=matched.angle,
         size=None if field.size is None else field.size[refinement.parent],
-        confidence=None if field.confidence is None else field.confidence[refinement.parent],
+        trust=field.trust[refinement.parent],
         feature=matched.feature,
         axis=matched.axis,
         rotation=matched.rotation,

@@ -15,7 +15,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from vhquad.field.boundary import boundary_tangents
-from vhquad.field.cross import CrossField, trust_in
+from vhquad.field.cross import CrossField
 from vhquad.field.dual import face_angles
 from vhquad.field.matching import MatchedField, match_field
 from vhquad.field.refine import Refinement
@@ -30,7 +30,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 LEAST_SMOOTHING = 1e-9  # of the mesh's diagonal
-SURE_SMOOTHING = 0.5  # of the smoothing, where the field is sure: its detail is meant
+SURE_SMOOTHING = 0.1  # of the smoothing, where the field is sure: its detail is meant
 REACH = 4.0  # sizes beyond which features do not weaken the given field
 
 
@@ -102,7 +102,7 @@ def pose(
         Edge length of the quads to come, at those faces.
     smoothing : float
         Details of the field smaller than this many sizes are smoothed away, where it is sure those
-        below half of that.
+        below a tenth of that.
     seam : (3m,) bool, optional
         Boundary halfedges beyond which the surface goes on, mirrored.
     """
@@ -117,11 +117,10 @@ def pose(
     target[on // 3] = np.exp(4j * (face_angles(mesh) + boundary.lean)[on])
     fixed = np.zeros(mesh.n_faces, dtype=bool)
     fixed[on // 3] = True
-    detail = smoothing * size
+    detail = smoothing * size * SURE_SMOOTHING ** field.trust[refinement.parent]
     weight = np.ones(mesh.n_faces)
     if field.confidence is not None:
         weight = field.confidence[refinement.parent]
-        detail = detail * SURE_SMOOTHING ** trust_in(weight)
     weight = weight * mesh.face_areas / np.maximum(detail, LEAST_SMOOTHING * mesh.diagonal) ** 2
     weight = weight * (target != 0) * _distance_trust(mesh, on, size)
     return Posed(mesh, feature, boundary.lean, boundary.corner, target, weight, fixed, size, seam)

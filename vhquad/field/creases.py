@@ -26,7 +26,7 @@ GAP = 0.75
 """Quad edges; creases that end so near others go on to them."""
 LOOSE = 1.5
 """Quad edges; shorter creases that end loose are noise."""
-KNOWN = 0.5  # mean trust in the field beside a chain of creases from which on the field decides
+KNOWN_CHAIN = 0.5  # mean trust in the field beside a chain from which on the field decides
 CROSSED = np.radians(5)  # mean angle between a chain and the nearest arms of the field
 
 
@@ -93,5 +93,5 @@ def without_known(mesh: TriMesh, pairs: Ints, sharp: Ints, field: CrossField) ->
     length = lengths_of_edges(mesh)[edge]
     total = np.bincount(chain, length)
     crossed = np.bincount(chain, length * off) > CROSSED * total
-    known = np.bincount(chain, length * trust) > KNOWN * total
+    known = np.bincount(chain, length * trust) > KNOWN_CHAIN * total
     return mesh.edges[edge[~(crossed & known)[chain]]]

@@ -10,17 +10,12 @@ from numpy.typing import NDArray
 
 from vhquad.errors import FieldError
 
-__all__ = ["SURE", "CrossField", "Domain", "trust_in"]
+__all__ = ["SURE", "CrossField", "Domain"]
 
 Domain = Literal["vertices", "faces"]
 
 ROUNDING = 1e-15  # of a modulus of 1
 SURE = 0.9  # confidence from which on directions count for more than even sizes and smoothness
-
-
-def trust_in(confidence: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far directions of some confidence go before even sizes and smoothness, in [0, 1]."""
-    return np.asarray(np.clip((confidence - SURE) / (1.0 - SURE), 0.0, 1.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +68,13 @@ class CrossField:
 
     @property
     def trust(self) -> NDArray[np.float64]:
-        """Of :func:`trust_in`; none in a field that does not say how sure it is; (n,)."""
-        return np.zeros(len(self)) if self.confidence is None else trust_in(self.confidence)
+        """How far directions go before even sizes and smoothness, in [0, 1]; (n,).
+
+        A field that does not say how sure it is earns none.
+        """
+        if self.confidence is None:
+            return np.zeros(len(self))
+        return np.clip((self.confidence - SURE) / (1.0 - SURE), 0.0, 1.0)
 
     @property
     def angle(self) -> NDArray[np.float64]:

@@ -23,7 +23,7 @@ from vhquad.quad.aspects import smoothed_aspects
 from vhquad.quad.curves import CurveConstraints
 from vhquad.quad.descent import descend, laplacian_factor
 from vhquad.quad.lift import wrong_quads
-from vhquad.quad.sliding import Problem, Pulls, make_problem, measure, place
+from vhquad.quad.sliding import Guidance, Problem, Pulls, make_problem, measure, place
 from vhquad.quad.smooth import smoothed_sizes
 
 __all__ = ["attach_to_creases"]
@@ -123,7 +123,7 @@ def attach_to_creases(
             CurveConstraints.none(len(used)),
             still[used],
             size[inside],
-            aspect=aspect[inside],
+            replace(Guidance.none(len(inside)), aspect=aspect[inside]),
         )
         x[used] = _attached(part, x[used], own[free], points[mine], length)
     return x

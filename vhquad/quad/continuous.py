@@ -34,9 +34,8 @@ Bools = NDArray[np.bool_]
 _LEAST_FACES = 1000  # below this a look into the cache takes as long as the map
 _ALIGNED = (
     *("parent_face", "angle", "feature", "axis", "rotation"),
-    *("sector", "sector_quads", "sector_vertex", "sector_is_feature"),
+    *("sector", "sector_quads", "sector_vertex", "sector_is_feature", "trust"),
 )
-_OPTIONAL = ("size", "confidence")
 _SEAMLESS = ("uv", "turns", "translation")
 _NUMBERS = ("unit", "flips", "wrong_angles", "solves")
 
@@ -149,9 +148,7 @@ def _arrays(made: ContinuousMap) -> dict[str, NDArray[Any]]:
     aligned, seamless = made.aligned, made.seamless
     arrays = {"vertices": aligned.mesh.vertices, "faces": aligned.mesh.faces}
     arrays |= {name: getattr(aligned, name) for name in _ALIGNED}
-    for name in _OPTIONAL:
-        value = getattr(aligned, name)
-        arrays[name] = np.zeros(0) if value is None else value
+    arrays["size"] = np.zeros(0) if aligned.size is None else aligned.size
     parts = (seamless.uv, seamless.rotation, seamless.translation)
     arrays |= dict(zip(_SEAMLESS, parts, strict=True))
     arrays["numbers"] = np.array([getattr(seamless, name) for name in _NUMBERS], dtype=np.float64)
@@ -161,7 +158,7 @@ def _arrays(made: ContinuousMap) -> dict[str, NDArray[Any]]:
 
 def _read(path: Path) -> ContinuousMap | None:
     """An entry of the cache, None if it is absent or damaged."""
-    names = ("vertices", "faces", *_ALIGNED, *_OPTIONAL, *_SEAMLESS, "numbers", "report")
+    names = ("vertices", "faces", *_ALIGNED, "size", *_SEAMLESS, "numbers", "report")
     found = read_arrays(path, names)
     if found is None:
         return None
@@ -173,8 +170,8 @@ def _read(path: Path) -> ContinuousMap | None:
     except (MeshError, ValueError, TypeError):
         return None
     parts: dict[str, Any] = {name: data[name] for name in _ALIGNED}
-    parts |= {name: data[name] if len(data[name]) else None for name in _OPTIONAL}
-    aligned = AlignedField(mesh=mesh, report=report, **parts)
+    size = data["size"] if len(data["size"]) else None
+    aligned = AlignedField(mesh=mesh, report=report, size=size, **parts)
     flips, wrong_angles, solves = (int(count) for count in counts)
     seamless = SeamlessMap(
         data["uv"], unit, data["turns"], data["translation"], flips, wrong_angles, solves

@@ -56,8 +56,8 @@ def spread(problem: Problem, state: State, factor: SymmetricFactor, iterations: 
     """Move vertices so that quads come near their own best-fitting squares; the last state."""
     quads = problem.quads
     low, high = SQUARE_RANGE[0] * problem.size, SQUARE_RANGE[1] * problem.size
-    shape, area = shapes(problem.aspect, len(quads)), problem.size**2
-    guidance = GUIDANCE * problem.along.T
+    shape, area = shapes(problem.guidance.aspect, len(quads)), problem.size**2
+    guidance = GUIDANCE * problem.guidance.weight * problem.guidance.along.T
     for _ in range(iterations):
         n = reference_normals(problem, state.normals).T
         p = corners(state.vertices, quads)
@@ -91,7 +91,7 @@ def laplacian_factor(problem: Problem) -> SymmetricFactor:
     free = np.flatnonzero(~problem.fixed)
     tail = problem.quads.T.reshape(-1)
     head = np.roll(problem.quads, -1, axis=1).T.reshape(-1)
-    length = problem.size[:, None] * shapes(problem.aspect, len(problem.quads)).T
+    length = problem.size[:, None] * shapes(problem.guidance.aspect, len(problem.quads)).T
     weight = (1.0 / length**2).T.reshape(-1)
     half = coo_matrix((weight, (tail, head)), shape=(n, n)).tocsr()
     adjacency = half + half.T

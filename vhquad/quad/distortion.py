@@ -161,7 +161,7 @@ def distortion(
     return Distortion(float(cost.sum()), gathered(g, quads, len(vertices)), d.T)
 
 
-def directions(normals: Floats, along: Floats) -> Floats:
+def directions(normals: Floats, along: Floats, weight: Floats | None = None) -> Floats:
     """What :func:`misalignment` asks of edges: the direction that each should not have; (3, 4, k).
 
     Parameters
@@ -171,8 +171,12 @@ def directions(normals: Floats, along: Floats) -> Floats:
     along : (k, 3) float64
         Unit direction for edges 0 and 2 of each quad, either way; edges 1 and 3 should run at a
         right angle to it. Zero where any direction will do.
+    weight : (k,) float64, optional
+        Of each direction; the vectors are as long as its root. Default: 1.
     """
     first = unit(along - np.einsum("ki,ki->k", along, normals)[:, None] * normals)
+    if weight is not None:
+        first *= np.sqrt(weight)[:, None]
     second = cross(normals, first)
     return np.stack([second.T, first.T, second.T, first.T], axis=1)
 

@@ -125,11 +125,7 @@ def choose_place(
         with watch("stand-in"):
             on_faces = to_faces(place.mesh, cross)
             wanted = place.sizes(on_faces, settings)
-            size = wanted.relative_at_vertices(place.mesh)
-            lines = place.creases
-            refined = refine_curves(
-                place.mesh, size, wanted.scale, on_faces, lines, settings.crease
-            )
+            refined = refine_curves(place.mesh, wanted, on_faces, place.creases, settings.crease)
         if refined is not None:
             place = place.of(refined, place.mesh)
             with watch("field"):

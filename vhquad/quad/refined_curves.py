@@ -18,6 +18,7 @@ from vhquad.field.features import crease_halfedges
 from vhquad.field.refine import Refinement, lengths_of_edges, no_refinement, split_edges
 from vhquad.mesh.pn_triangles import PnTriangles
 from vhquad.mesh.triangle import TriMesh
+from vhquad.quad.sizing import WantedSizes
 from vhquad.quad.stand_in import StandIn
 
 __all__ = ["refine_curves"]
@@ -31,15 +32,15 @@ WORTH_FROM = 0.5  # of the quads on triangles with longer ones
 LEAST, LARGEST = 5_000, 9_000  # vertices of a mesh: fewer have little detail, more are fine enough
 MOST = 12_000  # vertices of a copy
 FIRST = 0.7  # of the largest factor by which an edge is too long: others wait
-SURE, KNOWN = 0.5, 0.8  # trust in the field of a face; share of a part that has as much
+SURE = 0.5  # trust in the field at a face
+KNOWN_PART = 0.8  # of the quads of a part: so many on sure faces, and the part is refined
 ROUNDS = 200
 THIN = 1e-12  # square of the area, by the length to the fourth: a triangle that is a line
 
 
 def refine_curves(
     mesh: TriMesh,
-    size: Floats,
-    scale: float,
+    wanted: WantedSizes,
     field: CrossField,
     creases: Ints | None = None,
     angle: float | None = None,
@@ -52,10 +53,8 @@ def refine_curves(
     ----------
     mesh : TriMesh
         Sound, any components and borders.
-    size : (n,) float64
-        Wanted length of quad edges near each vertex, up to the scale.
-    scale : float
-        It says whether there is a copy, not what it is like.
+    wanted : WantedSizes
+        At its faces. Their scale says whether there is a copy, not what it is like.
     field : CrossField
         On the faces. Parts of which it is not sure are left alone.
     creases : (k, 2) int64, optional
@@ -71,15 +70,17 @@ def refine_curves(
     """
     if not LEAST <= mesh.n_vertices <= LARGEST:
         return None
-    quads = mesh.face_areas / np.exp(2.0 * np.log(scale * size)[mesh.faces].mean(axis=1))
+    quads = mesh.face_areas / wanted.lengths**2
     sure = np.bincount(mesh.face_component, quads * (field.trust > SURE))
-    known = (sure > KNOWN * np.bincount(mesh.face_component, quads))[mesh.face_component]
-    coarse = (_factors(mesh, size, known) > LONGEST * scale)[mesh.halfedge_edge].reshape(-1, 3)
+    known = (sure > KNOWN_PART * np.bincount(mesh.face_component, quads))[mesh.face_component]
+    size = wanted.relative_at_vertices(mesh)
+    coarse = _factors(mesh, size, known) > LONGEST * wanted.scale
+    coarse = coarse[mesh.halfedge_edge].reshape(-1, 3)
     if quads[coarse.any(axis=1)].sum() < WORTH_FROM * quads.sum():
         return None
     lines = creases
     if lines is None and angle is not None:
-        edge = float(np.sqrt(mesh.area / quads.sum()))
+        edge = float(np.sqrt(2.0 * mesh.area / mesh.n_faces))  # of quads made of two triangles
         lines = creases_for_quads(mesh, angle, edge, field=field)
     sharp = crease_halfedges(mesh, lines)
     done = no_refinement(mesh)

@@ -24,6 +24,7 @@ from vhquad.quad.distortion import (
 
 __all__ = [
     "GUIDANCE",
+    "Guidance",
     "Problem",
     "Pulls",
     "State",
@@ -68,6 +69,24 @@ class Pulls:
 
 
 @dataclass(frozen=True, eq=False)
+class Guidance:
+    """How the edges of quads are to run, and how long they are to be for their width."""
+
+    along: Floats  # (k, 3) unit direction for edges 0 and 2 of each quad; 0 for any
+    weight: Floats  # (k,) of that direction, in GUIDANCE
+    aspect: Floats  # (k,) wanted length of edges 0 and 2 over that of edges 1 and 3
+
+    @staticmethod
+    def none(n_quads: int) -> Guidance:
+        """Squares in any direction."""
+        return Guidance(np.zeros((n_quads, 3)), np.ones(n_quads), np.ones(n_quads))
+
+    def of(self, inside: Ints) -> Guidance:
+        """That of some quads."""
+        return Guidance(self.along[inside], self.weight[inside], self.aspect[inside])
+
+
+@dataclass(frozen=True, eq=False)
 class Problem:
     """What stays the same while vertices move."""
 
@@ -79,8 +98,7 @@ class Problem:
     on_curve: Ints  # vertices that slide on a curve
     reach: Floats  # (n,) least wanted edge length around each vertex: the longest step
     trust: Floats  # (n,) weight of a vertex's surface normal in its quads' reference normals
-    along: Floats  # (k, 3) unit direction for edges 0 and 2 of each quad; 0 for any
-    aspect: Floats  # (k,) wanted length of edges 0 and 2 over that of edges 1 and 3
+    guidance: Guidance
     pulls: Pulls | None = None
 
 
@@ -122,22 +140,19 @@ def make_problem(
     curves: CurveConstraints,
     fixed: Bools,
     size: Floats,
-    along: Floats | None = None,
-    aspect: Floats | None = None,
+    guidance: Guidance | None = None,
 ) -> Problem:
     """Derive what stays the same from the parts of the problem."""
-    if along is None:
-        along = np.zeros((len(quads), 3))
-    if aspect is None:
-        aspect = np.ones(len(quads))
+    if guidance is None:
+        guidance = Guidance.none(len(quads))
     reach = np.full(len(fixed), np.inf)
-    length = size[:, None] * shapes(aspect, len(quads)).T
+    length = size[:, None] * shapes(guidance.aspect, len(quads)).T
     np.minimum.at(reach, quads.reshape(-1), length.reshape(-1))
     sliding = (curves.curve >= 0) & ~fixed
     # A crease has two normals: prefer those of a quad's plain vertices.
     trust = np.where((curves.curve >= 0) | fixed, 0.01, 1.0)
     on_curve = np.flatnonzero(sliding)
-    return Problem(quads, surface, curves, fixed, size, on_curve, reach, trust, along, aspect)
+    return Problem(quads, surface, curves, fixed, size, on_curve, reach, trust, guidance)
 
 
 def place(problem: Problem, wanted: Floats, before: State | None) -> State:
@@ -196,7 +211,10 @@ def measure(problem: Problem, x: Floats, arc: Floats, normals: Floats, face: Int
     folded = inverted_quads(sides, own) | ((facing <= 0) & (nearest <= 0))
     trusted = ~folded & (nearest > NEARLY)
     reference = np.where(trusted[:, None], own, around)
-    across = directions(reference, problem.along) if problem.along.any() else None
+    guidance = problem.guidance
+    across = None
+    if guidance.along.any():
+        across = directions(reference, guidance.along, guidance.weight)
     at = cost(problem, x, reference, across, SHARP, not folded.any(), sides)
     line = problem.on_curve
     return State(
@@ -224,7 +242,7 @@ def cost(
     sides: Sides | None = None,
 ) -> Distortion:
     """Distortion of the quads about some normals, what their edges run off the field, and pulls."""
-    quads, size, aspect = problem.quads, problem.size, problem.aspect
+    quads, size, aspect = problem.quads, problem.size, problem.guidance.aspect
     sides = sides or sides_of(x, quads)
     out = distortion(x, quads, normals, size, epsilon, SIZE_WEIGHT, with_gradient, aspect, sides)
     if across is not None:

@@ -25,7 +25,7 @@ from vhquad.quad.descent import better, descend, laplacian_factor, spread
 from vhquad.quad.distortion import corner_jacobians
 from vhquad.quad.guide import FieldGuide
 from vhquad.quad.settle import settle_on_curves
-from vhquad.quad.sliding import Problem, State, make_problem, measure, place
+from vhquad.quad.sliding import Guidance, Problem, State, make_problem, measure, place
 
 __all__ = ["smooth_quads", "smoothed_sizes"]
 
@@ -42,6 +42,7 @@ POOR_ROUNDS = 2
 POOR_RINGS = 4
 PATCH_ITERATIONS = 40
 PATIENCE = 60
+SURELY = 2.0  # weight of directions of which the field is sure, of that of others
 SETTLED = 0.3  # scaled Jacobian that nearness to a curve must leave a quad
 
 
@@ -75,8 +76,9 @@ def smooth_quads(
         Wanted edge length near each vertex. Default: the given distribution, smoothed. Only
         ratios count, since the sizes are scaled to fill the surface.
     guide : FieldGuide, optional
-        Field whose directions the edges should keep. Where it is sure, quads stay about as much
-        longer than wide as they are: squares of the same rows would turn their edges off it.
+        Field whose directions the edges should keep, twice as strictly where it is sure. There
+        quads stay about as much longer than wide as they are: squares of the same rows would turn
+        their edges off it.
 
     Returns
     -------
@@ -106,11 +108,13 @@ def smooth_quads(
         size = np.array(target_edge, dtype=np.float64)[q].mean(axis=1)
         size *= np.sqrt(surface.mesh.area / (size**2).sum())
     hold[np.setdiff1d(np.arange(len(x)), q)] = True
-    aspect, under = np.ones(len(q)), np.zeros(0, dtype=np.int64)
+    guidance, under = Guidance.none(len(q)), np.zeros(0, dtype=np.int64)
     if guide is not None:
         under = guide.faces(x[q].mean(axis=1))
-        aspect = smoothed_aspects(x, q) ** guide.trust(under)
-    problem = make_problem(q, surface, bound, hold, size, aspect=aspect)
+        trust = guide.trust(under)
+        weight, aspect = 1.0 + (SURELY - 1.0) * trust, smoothed_aspects(x, q) ** trust
+        guidance = replace(guidance, weight=weight, aspect=aspect)
+    problem = make_problem(q, surface, bound, hold, size, guidance)
     start = place(problem, x, None)
     if guide is not None:
         problem, start = _guided(problem, start, guide, under)
@@ -158,7 +162,7 @@ def _guided(
     """The problem with the directions of the field at its faces under the quads, and its state."""
     p = state.vertices[problem.quads]
     along = guide.along(under, p[:, 1] - p[:, 0] + p[:, 2] - p[:, 3])
-    problem = replace(problem, along=along)
+    problem = replace(problem, guidance=replace(problem.guidance, along=along))
     return problem, measure(problem, state.vertices, state.arc, state.normals, state.face)
 
 
@@ -195,8 +199,7 @@ def _solve_patch(
         problem.curves.bind(problem.curves.curve[used]),
         (held | problem.fixed)[used],
         problem.size[inside],
-        problem.along[inside] if guided else None,
-        problem.aspect[inside] if guided else None,
+        problem.guidance.of(inside) if guided else None,
     )
     if part.fixed.all():
         return state
