@@ -9,7 +9,8 @@ import pytest
 
 import vhquad
 from tests.command_line import write_obj
-from tests.meshes import icosphere, unwelded
+from tests.meshes import icosphere
+from tests.soups import unwelded
 from vhquad.errors import ConfigError, FieldError
 
 

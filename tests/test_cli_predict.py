@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from tests.command_line import Invoke, write_obj
-from tests.meshes import half_sphere, icosphere, unwelded
+from tests.meshes import half_sphere, icosphere
+from tests.soups import unwelded
 from vhquad.field.io import read_field
 from vhquad.mesh.load import load
 

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from tests.command_line import Invoke, write_obj
-from tests.meshes import icosphere, several_broken_parts, torus, two_spheres, unwelded
+from tests.meshes import icosphere, torus, two_spheres
+from tests.soups import several_broken_parts, unwelded
 from vhquad.mesh.io import read_quad_mesh
 from vhquad.quad import remeshing
 from vhquad.report import RemeshReport

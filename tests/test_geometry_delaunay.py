@@ -6,7 +6,7 @@ import igl
 import numpy as np
 import pytest
 
-from tests import meshes
+from tests import meshes, soups
 from tests.data_paths import data_file
 from vhquad.geometry.delaunay import (
     IntrinsicTriangulation,
@@ -142,7 +142,7 @@ def test_laplacian_agrees_with_libigl() -> None:
 
 
 def test_degenerate_triangles() -> None:
-    for soup in (meshes.with_cap(), meshes.with_needle()):
+    for soup in (soups.with_cap(), soups.with_needle()):
         mesh = TriMesh(*soup)
         tri = delaunay(mesh)
         # 1. Mollified, flipped, finite, Delaunay. (Angles of near-degenerate triangles are good to

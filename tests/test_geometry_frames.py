@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests import meshes
+from tests import meshes, soups
 from vhquad.errors import MeshError
 from vhquad.geometry.frames import (
     Axes,
@@ -161,7 +161,7 @@ def test_to_3d_and_back(rng: np.random.Generator) -> None:
 
 
 def test_degenerate_faces_keep_everything_finite() -> None:
-    for soup in (meshes.with_cap(), meshes.with_needle()):
+    for soup in (soups.with_cap(), soups.with_needle()):
         mesh = TriMesh(*soup)
         frames = build_frames(mesh)
         for value in (frames.transport, frames.vertex_to_face):
@@ -173,4 +173,4 @@ def test_degenerate_faces_keep_everything_finite() -> None:
 
 def test_pinched_vertices_are_refused() -> None:
     with pytest.raises(MeshError, match=r"fans of faces.*repair"):
-        build_frames(TriMesh(*meshes.bowtie()))
+        build_frames(TriMesh(*soups.bowtie()))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from tests import meshes
+from tests import meshes, soups
 from tests.data_paths import data_file
 from vhquad.errors import MeshError
 from vhquad.mesh import io
@@ -80,7 +80,7 @@ def test_line_elements_are_creases(tmp_path: Path) -> None:
 
 
 def test_creases_survive_weld_and_split(tmp_path: Path) -> None:
-    v, f = meshes.two_cubes_on_an_edge()
+    v, f = soups.two_cubes_on_an_edge()
     axis = np.flatnonzero((v[:, :2] == 0).all(axis=1))
     path = tmp_path / "cubes.obj"
     rows = [f"v {x} {y} {z}\n" for x, y, z in v] + [f"f {a} {b} {c}\n" for a, b, c in f + 1]

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests import meshes
-from tests.meshes import EVERY, SOUPS, Case, voxels
+from tests import meshes, soups
+from tests.meshes import EVERY, Case, voxels
+from tests.soups import SOUPS
 from vhquad.errors import MeshError
 from vhquad.mesh.degenerate import is_degenerate
 from vhquad.mesh.repair import RepairResult, repair
@@ -63,7 +64,7 @@ def test_a_sound_mesh_comes_back_as_it_was(case: Case) -> None:
 def test_a_triangle_soup_in_any_order_is_put_together_again(
     case: Case, rng: np.random.Generator
 ) -> None:
-    v, f = meshes.unwelded(meshes.relabel(case.mesh, rng).mesh)
+    v, f = soups.unwelded(meshes.relabel(case.mesh, rng).mesh)
     f = f.copy()
     turned = rng.random(len(f)) < 0.4
     f[turned] = f[turned][:, ::-1]
@@ -77,7 +78,7 @@ def test_a_triangle_soup_in_any_order_is_put_together_again(
 
 
 def test_scale_and_place_do_not_matter() -> None:
-    v, f = meshes.several_broken_parts()
+    v, f = soups.several_broken_parts()
     plain = repair(v, f)
     for factor in (1e-60, 1e-9, 1e12, 1e90):
         scaled = repair(v * factor, f)
@@ -126,7 +127,7 @@ def test_counts_of_each_soup() -> None:
 
 
 def test_maps_lead_back_to_the_input(rng: np.random.Generator) -> None:
-    v, f = meshes.several_broken_parts()
+    v, f = soups.several_broken_parts()
     result = repair(v, f)
     assert (result.vertex_source >= 0).all()
     np.testing.assert_array_equal(v[result.vertex_source], result.mesh.vertices)
@@ -151,7 +152,7 @@ def test_two_sided_sheet_keeps_one_side() -> None:
 def test_a_wall_between_two_rooms_goes() -> None:
     left = meshes.moved(meshes.cube(1), (-0.5, 0.0, 0.0))
     right = TriMesh(left.vertices * np.array([-1.0, 1.0, 1.0]), left.faces[:, ::-1])
-    result = repair(*meshes.unwelded(meshes.merge(left, right)))
+    result = repair(*soups.unwelded(meshes.merge(left, right)))
     assert result.report.folded_faces == 4
     assert (result.mesh.n_vertices, result.mesh.euler_characteristic) == (12, 2)
     assert result.mesh.is_closed
@@ -223,7 +224,7 @@ def test_most_of_the_area_decides_for_a_flat_sheet() -> None:
 
 
 def test_an_edge_between_the_same_two_vertices_twice() -> None:
-    v, f = meshes.doubled_edge()
+    v, f = soups.doubled_edge()
     result = repair(v, f)
     kept = np.sort(np.delete(f, [1, 2], axis=0), axis=1)
     _, count = np.unique(
@@ -242,7 +243,7 @@ def test_an_edge_between_the_same_two_vertices_twice() -> None:
 
 
 def test_nothing_with_area_is_lost_and_the_rest_is_reported() -> None:
-    result = repair(*meshes.several_broken_parts())
+    result = repair(*soups.several_broken_parts())
     assert result.report.lost_components == 1
     assert result.mesh.n_components == 4
 

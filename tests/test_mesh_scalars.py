@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.meshes import doubled_edge, icosphere, unwelded
+from tests.meshes import icosphere
+from tests.soups import doubled_edge, unwelded
 from vhquad.errors import MeshError
 from vhquad.mesh.load import load
 from vhquad.mesh.scalars import read_density, read_scalars

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests import meshes
-from tests.meshes import CLOSED, EVERY, OPEN, SOUPS, Case
+from tests import meshes, soups
+from tests.meshes import CLOSED, EVERY, OPEN, Case
+from tests.soups import SOUPS
 from vhquad.errors import MeshError
 from vhquad.mesh.triangle import TriMesh, next_halfedge, prev_halfedge
 
@@ -118,7 +119,7 @@ def test_topology_errors_name_the_place(name: str) -> None:
 
 
 def test_bowtie_is_seen() -> None:
-    assert not TriMesh(*meshes.bowtie()).has_manifold_vertices
+    assert not TriMesh(*soups.bowtie()).has_manifold_vertices
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests import meshes
+from tests import meshes, soups
 from tests.meshes import EVERY, Case
 from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.weld import components, open_vertices, position_classes, weld_quads, weld_seams
@@ -35,7 +35,7 @@ def test_open_vertices_are_those_of_the_boundary(case: Case) -> None:
 def test_closed_parts_keep_their_own_vertices() -> None:
     twice = meshes.merge(meshes.cube(1), meshes.cube(1))
     assert (weld_seams(twice.vertices, twice.faces) == np.arange(twice.n_vertices)).all()
-    v, f = meshes.unwelded(meshes.cube(1))
+    v, f = soups.unwelded(meshes.cube(1))
     assert len(np.unique(weld_seams(v, f))) == 8
 
 
