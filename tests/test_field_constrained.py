@@ -43,11 +43,11 @@ def test_a_field_is_sure_if_it_says_so() -> None:
 @pytest.mark.parametrize("smoothing", [0.25, 1.0])
 def test_a_wave_is_damped_by_its_length(smoothing: float, confidence: float, trust: float) -> None:
     """``w / (w + k^2)`` is left of a wave of number k. The weight w is the confidence over the
-    squared length of detail, which is a tenth where the field is sure."""
+    squared length of detail, which is half as much where the field is sure."""
     plain, left = (left_of_a_wave(smoothing, value) for value in (None, confidence))
     # On these triangles the wave is no exact eigenvector, and its energy 9 % above the plane's.
     weight = 1.0 / (0.2 * smoothing) ** 2
     assert plain == pytest.approx(weight / (weight + (2 * np.pi) ** 2), rel=0.1)
     # All else is exact: it is as if so much shorter details had been asked for.
-    shorter = smoothing * 0.1**trust / np.sqrt(confidence)
+    shorter = smoothing * 0.5**trust / np.sqrt(confidence)
     assert 1.0 - left == pytest.approx(1.0 - left_of_a_wave(shorter, None), rel=1e-9)

@@ -48,7 +48,7 @@ class AlignSettings:
         the field as they are, or what makes 2,000 quads.
     smoothing : float
         Details of the field smaller than this many edge lengths are smoothed away, where it is
-        sure those below a tenth of that.
+        sure those below half of that.
     cancel : float
         Opposite singularities closer than this many edge lengths are cancelled, and those as close
         to a boundary or crease move on to it; 0 changes none.

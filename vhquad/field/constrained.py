@@ -30,7 +30,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 LEAST_SMOOTHING = 1e-9  # of the mesh's diagonal
-SURE_SMOOTHING = 0.1  # of the smoothing, where the field is sure: its detail is meant
+SURE_SMOOTHING = 0.5  # of the smoothing, where the field is sure: its detail is meant
 REACH = 4.0  # sizes beyond which features do not weaken the given field
 
 
@@ -102,7 +102,7 @@ def pose(
         Edge length of the quads to come, at those faces.
     smoothing : float
         Details of the field smaller than this many sizes are smoothed away, where it is sure those
-        below a tenth of that.
+        below half of that.
     seam : (3m,) bool, optional
         Boundary halfedges beyond which the surface goes on, mirrored.
     """

@@ -19,6 +19,7 @@ from vhquad.field.grow import are_mostly_creases
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.triangle import TriMesh
 from vhquad.quad.counts import map_quads, narrow_map_quads
+from vhquad.quad.known import known_parts
 from vhquad.report import MAP
 
 __all__ = ["Attempt", "Component"]
@@ -127,7 +128,7 @@ class Component:
             quads = narrow_map_quads(self.target)
             creases = self._creases(plan.crease_length, quads)
             shared = map_quads(self.target, self.mesh.n_faces)
-            free = not self.density and self.curving(creases) == 0
+            free = not self.density and not self._is_known and self.curving(creases) == 0
             if free and shared != quads:
                 quads, creases = shared, self._creases(plan.crease_length, shared)
             key = (plan.smoothing, creases.tobytes())
@@ -169,6 +170,11 @@ class Component:
     def _is_designed(self, creases: Ints) -> bool:
         given = self.creases is not None
         return len(creases) > 0 and (given or are_mostly_creases(self.mesh, creases, self._sharp))
+
+    @cached_property
+    def _is_known(self) -> bool:
+        size = np.ones(self.mesh.n_faces) if self.field.size is None else self.field.size
+        return bool(known_parts(self.mesh, self.field, size)[0])
 
     @cached_property
     def _sharp(self) -> Ints:

@@ -1,7 +1,7 @@
 """Numbers of quads in classes: what is made for one number of a class serves all of them.
 
 A class goes from some number of quads to four times as many, or to twice as many where creases or a
-density are followed. 7,071 is where classes of either kind begin.
+density are followed, or a field whose detail is meant. 7,071 is where classes of either kind begin.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ __all__ = ["map_quads", "narrow_map_quads", "stand_in_quads"]
 SPAN = 4.0
 NARROW_SPAN = 2.0
 """On parts that follow creases: which to keep, and how far they bound sizes, goes with the size of
-quads. And where a density was asked for: the turns that it needs must not be smoothed away."""
+quads. Where a density was asked for: the turns that it needs must not be smoothed away. And on
+parts that are known: nor must the detail of their field."""
 MAPPED = 8_000.0
 """For so many quads of the class from 7,071 on, and as much of the others, maps are made. Fields
 are smoothed by the size of quads: a map suits the coarse end of its class, and is smoother than
@@ -39,7 +40,7 @@ def map_quads(n_quads: float, n_faces: float) -> float:
 
 
 def narrow_map_quads(n_quads: float) -> float:
-    """The same where creases or a density are followed."""
+    """The same in the classes that are narrow."""
     return MAPPED * _times(n_quads, NARROW_SPAN)
 
 

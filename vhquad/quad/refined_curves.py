@@ -18,6 +18,7 @@ from vhquad.field.features import crease_halfedges
 from vhquad.field.refine import Refinement, lengths_of_edges, no_refinement, split_edges
 from vhquad.mesh.pn_triangles import PnTriangles
 from vhquad.mesh.triangle import TriMesh
+from vhquad.quad.known import known_parts
 from vhquad.quad.sizing import WantedSizes
 from vhquad.quad.stand_in import StandIn
 
@@ -32,8 +33,6 @@ WORTH_FROM = 0.5  # of the quads on triangles with longer ones
 LEAST, LARGEST = 5_000, 9_000  # vertices of a mesh: fewer have little detail, more are fine enough
 MOST = 12_000  # vertices of a copy
 FIRST = 0.7  # of the largest factor by which an edge is too long: others wait
-SURE = 0.5  # trust in the field at a face
-KNOWN_PART = 0.8  # of the quads of a part: so many on sure faces, and the part is refined
 ROUNDS = 200
 THIN = 1e-12  # square of the area, by the length to the fourth: a triangle that is a line
 
@@ -56,7 +55,7 @@ def refine_curves(
     wanted : WantedSizes
         At its faces. Their scale says whether there is a copy, not what it is like.
     field : CrossField
-        On the faces. Parts of which it is not sure are left alone.
+        On the faces. Parts that are not known (:mod:`vhquad.quad.known`) are left alone.
     creases : (k, 2) int64, optional
         Edges that quads must follow, in place of those sharper than the angle. They stay straight,
         as borders do.
@@ -70,10 +69,8 @@ def refine_curves(
     """
     if not LEAST <= mesh.n_vertices <= LARGEST:
         return None
-    quads = mesh.face_areas / wanted.lengths**2
-    sure = np.bincount(mesh.face_component, quads * (field.trust > SURE))
-    known = (sure > KNOWN_PART * np.bincount(mesh.face_component, quads))[mesh.face_component]
-    size = wanted.relative_at_vertices(mesh)
+    known = known_parts(mesh, field, wanted.relative)[mesh.face_component]
+    quads, size = mesh.face_areas / wanted.lengths**2, wanted.relative_at_vertices(mesh)
     coarse = _factors(mesh, size, known) > LONGEST * wanted.scale
     coarse = coarse[mesh.halfedge_edge].reshape(-1, 3)
     if quads[coarse.any(axis=1)].sum() < WORTH_FROM * quads.sum():
