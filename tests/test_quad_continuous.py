@@ -37,8 +37,12 @@ def _run(mesh: TriMesh, count: int, cache: bool, known: bool = False) -> RemeshR
 
 @pytest.mark.parametrize(
     ("span", "made_for"),
-    [(4.0, lambda n: map_quads(n, 1e9)), (2.0, narrow_map_quads)],
-    ids=["smooth", "creased"],
+    [
+        (4.0, lambda n: map_quads(n, 1e9)),
+        (2.0, lambda n: map_quads(n, 1e9, known=True)),
+        (2.0, narrow_map_quads),
+    ],
+    ids=["smooth", "known", "creased"],
 )
 def test_classes(span: float, made_for: Callable[[float], float]) -> None:
     """1. One after the other, each with its maps for one count near its least."""
@@ -54,6 +58,7 @@ def test_coarse_meshes_share_a_map() -> None:
     """1. More quads than a quarter as many as triangles ask for no other map; stand-ins do."""
     assert map_quads(9_000, 28_000) == map_quads(2_000, 28_000) == 2_000
     assert map_quads(9_000, 29_000) == 8_000
+    assert map_quads(9_000, 28_000, known=True) == map_quads(4_000, 28_000, known=True) == 4_000
     assert stand_in_quads(7_100) == stand_in_quads(28_000) == 10_000
     assert stand_in_quads(28_500) == 40_000
 

@@ -127,8 +127,8 @@ class Component:
         for plan in _PLANS:
             quads = narrow_map_quads(self.target)
             creases = self._creases(plan.crease_length, quads)
-            shared = map_quads(self.target, self.mesh.n_faces)
-            free = not self.density and not self._is_known and self.curving(creases) == 0
+            shared = map_quads(self.target, self.mesh.n_faces, self._is_known)
+            free = not self.density and self.curving(creases) == 0
             if free and shared != quads:
                 quads, creases = shared, self._creases(plan.crease_length, shared)
             key = (plan.smoothing, creases.tobytes())

@@ -27,7 +27,7 @@ FACES = 4.0
 FEWEST = 500.0  # quads: but more than these
 
 
-def map_quads(n_quads: float, n_faces: float) -> float:
+def map_quads(n_quads: float, n_faces: float, known: bool = False) -> float:
     """For how many quads the continuous map of a mesh is made that serves this number.
 
     Parameters
@@ -35,12 +35,15 @@ def map_quads(n_quads: float, n_faces: float) -> float:
     n_quads : float
     n_faces : float
         Triangles of the mesh.
+    known : bool
+        It is a part that is known (:mod:`vhquad.quad.known`).
     """
-    return MAPPED * _times(min(n_quads, max(n_faces / FACES, FEWEST)), SPAN)
+    span = NARROW_SPAN if known else SPAN
+    return MAPPED * _times(min(n_quads, max(n_faces / FACES, FEWEST)), span)
 
 
 def narrow_map_quads(n_quads: float) -> float:
-    """The same in the classes that are narrow."""
+    """The same where creases or a density are followed."""
     return MAPPED * _times(n_quads, NARROW_SPAN)
 
 
