@@ -39,10 +39,9 @@ def _run(mesh: TriMesh, count: int, cache: bool, known: bool = False) -> RemeshR
     ("span", "made_for"),
     [
         (4.0, lambda n: map_quads(n, 1e9)),
-        (2.0, lambda n: map_quads(n, 1e9, known=True)),
         (2.0, narrow_map_quads),
     ],
-    ids=["smooth", "known", "creased"],
+    ids=["smooth", "creased"],
 )
 def test_classes(span: float, made_for: Callable[[float], float]) -> None:
     """1. One after the other, each with its maps for one count near its least."""
@@ -59,6 +58,18 @@ def test_coarse_meshes_share_a_map() -> None:
     assert map_quads(9_000, 28_000) == map_quads(2_000, 28_000) == 2_000
     assert map_quads(9_000, 29_000) == 8_000
     assert map_quads(9_000, 28_000, known=True) == map_quads(4_000, 28_000, known=True) == 4_000
+
+
+def test_classes_of_known_parts() -> None:
+    """1. Narrow up to where the detail of fields ends, then wide."""
+    for n in np.geomspace(1.0, 7_000, 100):
+        assert map_quads(n, 1e9, known=True) == narrow_map_quads(n)
+    for n in np.geomspace(7_100, 1e6, 100):
+        assert map_quads(n, 1e9, known=True) == map_quads(n, 1e9)
+
+
+def test_coarse_meshes_share_a_stand_in() -> None:
+    """1. By the count alone."""
     assert stand_in_quads(7_100) == stand_in_quads(28_000) == 10_000
     assert stand_in_quads(28_500) == 40_000
 

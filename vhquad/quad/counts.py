@@ -14,7 +14,7 @@ SPAN = 4.0
 NARROW_SPAN = 2.0
 """On parts that follow creases: which to keep, and how far they bound sizes, goes with the size of
 quads. Where a density was asked for: the turns that it needs must not be smoothed away. And on
-parts that are known: nor must the detail of their field."""
+parts that are known, below 7,071: nor must the detail of their field, which is not for more."""
 MAPPED = 8_000.0
 """For so many quads of the class from 7,071 on, and as much of the others, maps are made. Fields
 are smoothed by the size of quads: a map suits the coarse end of its class, and is smoother than
@@ -38,8 +38,8 @@ def map_quads(n_quads: float, n_faces: float, known: bool = False) -> float:
     known : bool
         It is a part that is known (:mod:`vhquad.quad.known`).
     """
-    span = NARROW_SPAN if known else SPAN
-    return MAPPED * _times(min(n_quads, max(n_faces / FACES, FEWEST)), span)
+    n_quads = min(n_quads, max(n_faces / FACES, FEWEST))
+    return MAPPED * _times(n_quads, NARROW_SPAN if known and n_quads < LEAST else SPAN)
 
 
 def narrow_map_quads(n_quads: float) -> float:
