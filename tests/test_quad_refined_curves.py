@@ -86,8 +86,8 @@ def test_triangles_are_small_where_quads_are(monkeypatch: pytest.MonkeyPatch) ->
     assert edges[place > 0.2].mean() < 0.6 * edges[place < -0.2].mean()
 
 
-def test_one_copy_serves_all_numbers_of_quads() -> None:
-    mesh = meshes.icosphere(3)
+@pytest.mark.parametrize("mesh", [meshes.icosphere(3), meshes.cube(6)], ids=["ball", "cube"])
+def test_one_copy_serves_all_numbers_of_quads(mesh: TriMesh) -> None:
     one, two = refined(mesh, 1000), refined(mesh, 4000)
     assert one is not None
     assert two is not None
