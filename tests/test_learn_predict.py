@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from vhquad.learn.predict import predict_field
 from vhquad.learn.proxy import by_components, carry_back, make_proxy
 from vhquad.mesh.triangle import TriMesh
 from vhquad.nn.checkpoint import Model
+from vhquad.nn.network import FieldOutput
 
 
 @pytest.fixture(scope="module")
@@ -200,6 +202,24 @@ def test_shapes_without_features_get_a_common_size() -> None:
     size = predict_field(mesh, blank, cache=False).size
     assert size is not None
     np.testing.assert_allclose(size, 0.02 * np.sqrt(mesh.area), rtol=1e-5)
+
+
+def test_sizes_have_a_bound() -> None:
+    """10. A region where the network loses all measure does not take the quads from the rest."""
+    mesh = blob(2)
+    wild = random_network(small_settings(), torch.float32)
+
+    def blow_up(_network: object, _given: object, output: FieldOutput) -> FieldOutput:
+        size = torch.linspace(0.01, 0.03, mesh.n_vertices)
+        size[:5] = 20.0
+        return replace(output, size=size)
+
+    wild.register_forward_hook(blow_up)
+    size = predict_field(mesh, Model(wild), cache=False).size
+    assert size is not None
+    given = np.linspace(0.01, 0.03, mesh.n_vertices)
+    given[:5] = 10.0 * np.median(np.append(given[5:], np.full(5, np.inf)))
+    np.testing.assert_allclose(size, given * np.sqrt(mesh.area), rtol=1e-5)
 
 
 def test_wrong_options_are_refused(model: Model) -> None:

@@ -112,7 +112,7 @@ def test_settings_check_themselves() -> None:
 def test_the_shipped_model() -> None:
     """6. It is there, loads, is the starter preset deepened, and carries the losses of its card."""
     model = load_model()
-    assert model.settings == replace(preset("starter"), blocks=6)
+    assert model.settings == replace(preset("starter"), blocks=8)
     assert default_model_path().stat().st_size < 10_000_000
     assert model.losses["test"]["direction"] < 0.05
     card = (default_model_path().parent / "README.md").read_text(encoding="utf-8")

@@ -27,7 +27,7 @@ Complexes = NDArray[np.complex128]
 
 LENGTH = 0.05  # the agreement is averaged over about this distance, in square roots of the area
 SHAPE = 0.7  # how much the mean over the shape counts, against the vertex's own neighbourhood
-NONE, FULL = 0.5, 0.98  # agreement that earns no confidence, and all of it
+NONE, FULL = 0.7, 0.98  # agreement that earns no confidence, and all of it
 POWER = 3  # a rise late and steep
 
 

@@ -32,6 +32,7 @@ from vhquad.nn.settings import ModelSettings
 __all__ = ["Prediction", "predict_field", "predict_input"]
 
 SMALLEST = 5e-4  # quad edge over sqrt(area): four million quads
+LARGEST = 10.0  # quad edge over the median of the mesh: more than any that an artist drew
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,6 +130,8 @@ def predict_input(network: VectorHeatNet, mesh: NetworkInput) -> Prediction:
     size = torch.sqrt(own.size * other.size).cpu().double().numpy()
     # A sphere has no features, and an untrained network then no size either: take a common one.
     size = np.where(size > SMALLEST, size, LENGTH_UNIT) * mesh.length
+    # On shapes that it does not know the network may exceed all bounds.
+    size = np.minimum(size, LARGEST * np.median(size))
     z, mirrored = unstack(own.z), unstack(other.z)
     return Prediction(0.5 * (z + mirrored), size, agreement(z, mirrored))
 
