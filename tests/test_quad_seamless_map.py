@@ -111,13 +111,13 @@ def test_directions_are_kept_before_sizes() -> None:
 
 
 def test_sizes_count_less_where_the_field_is_sure() -> None:
-    turn = np.array([0.0, 0.5, 1.0, 2.0, 3.0])
-    doubted, sure = (size_weights(turn, np.full(5, t)) for t in (0.0, 1.0))
-    # 1: in doubt, the turn of the surface, at least 0.1; 2: if sure, its cube by a twentieth.
-    np.testing.assert_allclose(doubted, [0.1, 0.5, 1.0, 1.0, 1.0])
-    np.testing.assert_allclose(sure, [0.01, 0.01, 0.05, 0.4, 1.0])
+    turn = np.array([0.0, 0.5, 1.0, 3.0])
+    doubted, sure = (size_weights(turn, np.full(4, t)) for t in (0.0, 1.0))
+    # 1: in doubt, the turn of the surface, at least 0.1; 2: if sure, a tenth of its third power.
+    np.testing.assert_allclose(doubted, [0.1, 0.5, 1.0, 1.0])
+    np.testing.assert_allclose(sure, [0.01, 0.0125, 0.1, 1.0])
     # 3: the geometric mean between, and sizes count again where the surface turns much.
-    np.testing.assert_allclose(size_weights(turn, np.full(5, 0.5)), np.sqrt(doubted * sure))
+    np.testing.assert_allclose(size_weights(turn, np.full(4, 0.5)), np.sqrt(doubted * sure))
 
 
 def test_motion_and_scale_change_nothing(rng: np.random.Generator) -> None:

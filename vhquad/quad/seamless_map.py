@@ -37,8 +37,7 @@ Ints = NDArray[np.int64]
 
 SIZE_WEIGHT = 0.01  # least one of sizes, against directions: where the field is sure
 DOUBTED_WEIGHT = 0.1  # the same where it is not
-SURE_WEIGHT = 0.05  # where it is, and the surface turns by a radian within a quad
-TURN_POWER = 3  # there sizes count by so high a power of this turn
+TURN_POWER = 3  # where the field is sure, sizes count by so high a power of how the surface turns
 FEW_FOLDS = 50  # that are worth unfolding by themselves
 RINGS = 4  # of triangles around them
 PULLING_SOLVES = 4  # to find out which creases need pulling, and how hard
@@ -298,7 +297,7 @@ def size_weights(turn: Floats, trust: Floats) -> Floats:
         In the directions of the field, from 0 to 1.
     """
     doubted = np.clip(turn, DOUBTED_WEIGHT, 1.0)
-    sure = np.clip(SURE_WEIGHT * turn**TURN_POWER, SIZE_WEIGHT, 1.0)
+    sure = np.clip(DOUBTED_WEIGHT * turn**TURN_POWER, SIZE_WEIGHT, 1.0)
     return np.asarray(doubted ** (1.0 - trust) * sure**trust)
 
 
