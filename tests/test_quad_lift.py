@@ -7,6 +7,7 @@ import pytest
 
 from tests.quad_meshes import quad_grid, quad_torus, shaken, triangulated
 from vhquad.mesh.closest import ClosestPoints
+from vhquad.mesh.quality import least_jacobians
 from vhquad.quad.lift import lifted, rim_vertices, wrong_quads
 from vhquad.quad.smooth import smooth_quads
 
@@ -68,6 +69,16 @@ def test_an_inner_held_vertex_is_let_go_where_nothing_else_helps() -> None:
     assert not wrong.any()
     assert not wrong_quads(out, q, surface).any()
     np.testing.assert_array_equal(out[rim], x[rim])
+
+
+def test_a_quad_on_a_line_is_wrong() -> None:
+    """Its corners turn the right way by rounding alone, so that none is folded."""
+    x, q = quad_grid(3)
+    surface = ClosestPoints(triangulated((x, q)))
+    flat = np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [2.0, 1e-15, 0.0], [1.0, 1e-15, 0.0]])
+    quad = np.array([[0, 1, 2, 3]])
+    assert (least_jacobians(flat, quad) > 0).all()
+    assert wrong_quads(flat, quad, surface).all()
 
 
 def test_rim_vertices_of_a_grid() -> None:

@@ -44,7 +44,7 @@ class Prediction:
     z : (n,) complex128
         N-th power of the direction, not normalised.
     size : (n,) float64
-        Length in units of the mesh, at most 10 times the median.
+        Length in units of the mesh, at most ``LARGEST`` times the median.
     agreement : (n,) float64
         cos of the angle between the answers for the mesh and for its mirror image, in [-1, 1];
         1 for a network that cannot tell one from the other.

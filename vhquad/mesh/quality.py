@@ -15,7 +15,14 @@ from vhquad.mesh.intersections import self_intersections
 from vhquad.mesh.quad import QuadMesh
 from vhquad.mesh.triangle import TriMesh
 
-__all__ = ["QualityReport", "check_quads", "flipped_quads", "least_jacobians", "scaled_jacobians"]
+__all__ = [
+    "QualityReport",
+    "check_quads",
+    "flipped_quads",
+    "least_jacobians",
+    "scaled_jacobians",
+    "without_area",
+]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -123,7 +130,7 @@ def check_quads(mesh: QuadMesh, against: TriMesh | ClosestPoints | None = None) 
         nonmanifold_edges=len(mesh.nonmanifold_edges),
         nonmanifold_vertices=len(mesh.nonmanifold_vertices),
         misoriented_edges=len(mesh.misoriented_edges),
-        degenerate_quads=int((flat | _without_area(mesh)).sum()),
+        degenerate_quads=int((flat | without_area(mesh)).sum()),
         unused_vertices=int((mesh.valence == 0).sum()),
         irregular_interior=mesh.irregular_interior,
         irregular_boundary=mesh.irregular_boundary,
@@ -166,6 +173,13 @@ def scaled_jacobians(mesh: QuadMesh) -> Floats:
 def least_jacobians(vertices: Floats, quads: Ints) -> Floats:
     """Scaled Jacobian of the worst corner of each quad; (k,)."""
     return np.asarray(scaled_jacobians(QuadMesh(vertices, quads)).min(axis=1))
+
+
+def without_area(mesh: QuadMesh) -> NDArray[np.bool_]:
+    """Quads whose area vanishes beside their longest edge; (k,)."""
+    p = mesh.vertices[mesh.quads]
+    longest = np.linalg.norm(np.roll(p, -1, axis=1) - p, axis=2).max(axis=1, initial=0.0)
+    return np.asarray(np.linalg.norm(_area_vectors(mesh), axis=1) <= _NO_AREA * longest**2)
 
 
 def flipped_quads(mesh: QuadMesh, surface: ClosestPoints) -> Ints:
@@ -224,9 +238,3 @@ def _area_vectors(mesh: QuadMesh) -> Floats:
     """Normal of each quad, as long as its area; (k, 3)."""
     p = mesh.vertices[mesh.quads]
     return np.asarray(0.5 * np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1]))
-
-
-def _without_area(mesh: QuadMesh) -> NDArray[np.bool_]:
-    p = mesh.vertices[mesh.quads]
-    longest = np.linalg.norm(np.roll(p, -1, axis=1) - p, axis=2).max(axis=1, initial=0.0)
-    return np.asarray(np.linalg.norm(_area_vectors(mesh), axis=1) <= _NO_AREA * longest**2)

@@ -21,7 +21,7 @@ from vhquad.geometry.sparse import SymmetricFactor
 from vhquad.mesh.closest import ClosestPoints
 from vhquad.mesh.facing import FacingPoints
 from vhquad.mesh.quad import QuadMesh
-from vhquad.mesh.quality import flipped_quads, scaled_jacobians
+from vhquad.mesh.quality import flipped_quads, scaled_jacobians, without_area
 from vhquad.mesh.rings import separate_parts, within_rings
 from vhquad.mesh.vectors import unit
 from vhquad.quad.distortion import SHARP, barrier_width, distortion, quad_normals
@@ -52,9 +52,9 @@ LEAST_SIZE = 0.5  # of the median in a patch
 
 
 def wrong_quads(vertices: Floats, quads: Ints, surface: ClosestPoints) -> Bools:
-    """Quads that a check would call folded, or turned against the surface; (k,)."""
+    """Quads that a check would call folded, without area, or turned against the surface; (k,)."""
     mesh = QuadMesh(vertices, quads)
-    wrong = np.asarray((scaled_jacobians(mesh) <= 0).any(axis=1))
+    wrong = (scaled_jacobians(mesh) <= 0).any(axis=1) | without_area(mesh)
     wrong[flipped_quads(mesh, surface)] = True
     return wrong
 
